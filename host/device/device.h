@@ -1,0 +1,102 @@
+/*
+ * The OpenCL device: finding and opening one, building and caching programs, launching kernels,
+ * buffers. Every OpenCL call of the library goes through here, so that a failure always names the
+ * call, the symbolic code, the kernel and the device.
+ */
+#ifndef OV_DEVICE_H
+#define OV_DEVICE_H
+
+#include "base/base.h"
+
+#define CL_TARGET_OPENCL_VERSION 120
+#include <CL/cl.h>
+
+/* How kernels are shaped for the device; passed to every build as -DOV_VECTOR, -DOV_LANES. A pack
+ * of OV_PACK points is handled by `lanes` work-items with vectors of `vector` floats. */
+typedef struct ov_shape {
+    uint32_t vector; /* 16, 8, 4 or 1 */
+    uint32_t lanes;  /* work-items that share a pack or an ellipsoid: 1 on CPUs, 32 on GPUs */
+} ov_shape;
+
+typedef struct ov_device {
+    ovoid_device_info info;
+    cl_platform_id platform;
+    cl_device_id id;
+    cl_context context;
+    cl_command_queue queue; /* in order */
+    ov_shape shape;
+    size_t max_group;            /* largest work-group */
+    uint64_t launches;           /* kernels enqueued since the device was opened */
+    struct ov_program *programs; /* built so far, a list */
+    bool cache_warned;           /* the user knows that the program cache does not work */
+} ov_device;
+
+/* The context's device, opening the default one if none is open yet. */
+ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
+
+/* Releases programs, queue and device; nothing happens when none is open. */
+void ov_device_close(ovoid_context *context);
+
+/* A kernel. `name` and `program` are string constants. */
+typedef struct ov_kernel {
+    cl_kernel handle;
+    const char *program;
+    const char *name;
+    size_t max_group; /* largest work-group of this kernel */
+    size_t arg_count;
+} ov_kernel;
+
+/* Makes the kernel `name` of kernels/<program>.cl, building that program on the first request (from
+ * the embedded source, or from the folder OVOID_KERNEL_DIR when that is set) and keeping it with
+ * the device. Build options: -cl-std=CL1.2, the shape, -DOV_PACK, and never a relaxed-math flag. */
+ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const char *name,
+                              ov_kernel *kernel);
+void ov_kernel_destroy(ov_kernel *kernel);
+
+/* One kernel argument: a value of `size` bytes. OV_ARG takes an lvalue (a cl_mem, a scalar). */
+typedef struct ov_arg {
+    size_t size;
+    const void *value;
+} ov_arg;
+#define OV_ARG(lvalue) ((ov_arg){sizeof(lvalue), &(lvalue)})
+#define OV_LOCAL(bytes) ((ov_arg){(bytes), NULL})
+
+/* Sets all arguments and enqueues a one-dimensional launch of at least `global` work-items in
+ * groups of `local` (0: the driver chooses; otherwise global is rounded up to a multiple, so
+ * kernels check their bounds). Does not wait. global == 0 does nothing. */
+ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t global, size_t local,
+                       const ov_arg *args, size_t arg_count);
+#define OV_LAUNCH(context, kernel, global, local, ...)                                             \
+    ov_launch((context), (kernel), (global), (local), (const ov_arg[]){__VA_ARGS__},               \
+              sizeof((const ov_arg[]){__VA_ARGS__}) / sizeof(ov_arg))
+
+/* A device buffer that remembers its size. {0} is an empty one. */
+typedef struct ov_buffer {
+    cl_mem memory;
+    size_t bytes; /* allocated */
+} ov_buffer;
+
+/* Makes the buffer at least `bytes` large (never zero), growing geometrically; contents are lost
+ * when it grows. `what` names it in errors. Beyond the device's max_allocation: OVOID_ERROR_LIMIT.
+ */
+ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t bytes,
+                               const char *what);
+void ov_buffer_destroy(ov_buffer *buffer);
+
+/* Copies between host and device, waiting for the end. bytes == 0 does nothing. */
+ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t offset,
+                             const void *data, size_t bytes);
+ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, size_t offset,
+                            void *data, size_t bytes);
+
+/* Waits until everything enqueued has run. */
+ovoid_status ov_finish(ovoid_context *context);
+
+/* Symbolic name of an OpenCL error code, "CL_INVALID_VALUE" and so on. */
+const char *ov_cl_name(cl_int code);
+
+/* Records a failed call: "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5), kernel field, device
+ * NAME". kernel may be NULL. Out-of-memory codes become OVOID_ERROR_MEMORY. */
+ovoid_status ov_cl_fail(ovoid_context *context, cl_int code, const char *call, const char *kernel);
+
+#endif

@@ -1,0 +1,91 @@
+/*
+ * What the files of this room share.
+ */
+#ifndef OV_DEVICE_INTERNAL_H
+#define OV_DEVICE_INTERNAL_H
+
+#include "device/device.h"
+
+/* ---- errors ------------------------------------------------------------------------------- */
+
+/* As ov_cl_fail() with the device's name given, for failures before the device is open. kernel and
+ * device may be NULL. */
+ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call,
+                           const char *kernel, const char *device);
+
+/* ---- text --------------------------------------------------------------------------------- */
+
+/* A growing text; {0} is an empty one. `text` is NULL or ends with a null byte. */
+typedef struct ov_text {
+    char *text;
+    size_t length;
+    size_t capacity;
+} ov_text;
+
+ovoid_status ov_text_append(ovoid_context *context, ov_text *text, const char *bytes,
+                            size_t length);
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4)))
+#endif
+ovoid_status
+ov_text_print(ovoid_context *context, ov_text *text, const char *format, ...);
+
+/* ---- devices ------------------------------------------------------------------------------ */
+
+typedef struct ov_device_entry {
+    ovoid_device_info info;
+    cl_platform_id platform;
+    cl_device_id id;
+    cl_device_type type; /* all bits: a simulator may be several types at once */
+    char defect[96];     /* why it cannot be used, "" when it can */
+} ov_device_entry;
+
+/* Prepares the process for OpenCL once then lists all devices of all platforms.
+ * *entries is to be freed; *platforms counts the platforms that answered or failed. */
+ovoid_status ov_devices_list(ovoid_context *context, ov_device_entry **entries, size_t *count,
+                             size_t *platforms);
+
+/* "cpu", "gpu", "accelerator", "other". */
+const char *ov_device_type_name(ovoid_device_type type);
+
+#define OV_POCL_PLATFORM "Portable Computing Language"
+
+/* PoCL 3.1 finds no device when it cannot write its own cache folder, and aborts when
+ * POCL_CACHE_DIR is empty. Finds out beforehand and, if so, points POCL_CACHE_DIR to a private
+ * folder. Call once, before the first OpenCL call. Writes one line for users of PoCL to warning, ""
+ * when there is nothing to say. */
+void ov_pocl_prepare(char *warning, size_t size);
+
+/* Creates a folder and those above it, mode 0700 each. False with errno when that fails. */
+bool ov_make_folders(const char *path);
+
+/* ---- programs ----------------------------------------------------------------------------- */
+
+typedef struct ov_source {
+    const char *name; /* file name below kernels/ */
+    const char *text;
+} ov_source;
+
+/* The embedded kernel sources, ended by a NULL name; made by cmake/EmbedKernels.cmake. */
+extern const ov_source ov_sources[];
+
+/* Releases all programs of the device. */
+void ov_programs_release(ov_device *device);
+
+/* What a cached program was made from and for; compared byte by byte on reading. */
+typedef struct ov_cache_entry {
+    const char *program;
+    ov_text key;
+} ov_cache_entry;
+
+/* Reads the binary of the entry; NULL when there is none that fits. Free with free(). */
+unsigned char *ov_cache_read(ov_device *device, const ov_cache_entry *entry, size_t *bytes);
+
+/* Keeps a binary. Failing costs speed alone: it is worth one warning per device. */
+void ov_cache_write(ovoid_context *context, ov_device *device, const ov_cache_entry *entry,
+                    const unsigned char *binary, size_t bytes);
+
+/* Whether OVOID_CACHE and the driver call for the cache. An unknown value counts as "auto". */
+bool ov_cache_wanted(const ov_device *device);
+
+#endif

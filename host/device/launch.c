@@ -1,0 +1,138 @@
+#include "device/internal.h"
+
+#include <stdlib.h>
+
+/* ---- launches ----------------------------------------------------------------------------- */
+
+static ovoid_status check_launch(ovoid_context *context, const ov_kernel *kernel, size_t global,
+                                 size_t local, size_t arg_count) {
+    if (arg_count != kernel->arg_count)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "kernel %s of %s.cl takes %zu arguments, %zu were given", kernel->name,
+                       kernel->program, kernel->arg_count, arg_count);
+    if (local > kernel->max_group)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "kernel %s runs in groups of at most %zu work-items on %s, %zu were asked "
+                       "for",
+                       kernel->name, kernel->max_group, context->device->info.name, local);
+    if (local && global > SIZE_MAX - (local - 1))
+        return ov_fail(context, OVOID_ERROR_LIMIT, "kernel %s: %zu work-items are too many",
+                       kernel->name, global);
+    return OVOID_OK;
+}
+
+ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t global, size_t local,
+                       const ov_arg *args, size_t arg_count) {
+    if (!global)
+        return OVOID_OK;
+    if (!context->device || !kernel->handle)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "a kernel was launched before it was made");
+    ovoid_status status = check_launch(context, kernel, global, local, arg_count);
+    if (status != OVOID_OK)
+        return status;
+    for (size_t i = 0; i < arg_count; i++) {
+        cl_int code = clSetKernelArg(kernel->handle, (cl_uint)i, args[i].size, args[i].value);
+        if (code != CL_SUCCESS)
+            return ov_cl_fail(context, code, "clSetKernelArg", kernel->name);
+    }
+    if (local)
+        global = (global + local - 1) / local * local;
+    cl_int code = clEnqueueNDRangeKernel(context->device->queue, kernel->handle, 1, NULL, &global,
+                                         local ? &local : NULL, 0, NULL, NULL);
+    if (code != CL_SUCCESS)
+        return ov_cl_fail(context, code, "clEnqueueNDRangeKernel", kernel->name);
+    context->device->launches++;
+    return OVOID_OK;
+}
+
+ovoid_status ov_finish(ovoid_context *context) {
+    if (!context->device)
+        return OVOID_OK;
+    cl_int code = clFinish(context->device->queue);
+    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clFinish", NULL);
+}
+
+/* ---- buffers ------------------------------------------------------------------------------ */
+
+#define SMALLEST_BUFFER 256 /* bytes */
+
+static cl_int allocate(ov_device *device, ov_buffer *buffer, size_t bytes) {
+    cl_int code;
+    cl_mem memory = clCreateBuffer(device->context, CL_MEM_READ_WRITE, bytes, NULL, &code);
+    if (code == CL_SUCCESS)
+        *buffer = (ov_buffer){memory, bytes};
+    return code;
+}
+
+ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t bytes,
+                               const char *what) {
+    ov_device *device;
+    ovoid_status status = ov_device_get(context, &device);
+    if (status != OVOID_OK)
+        return status;
+    if (buffer->memory && bytes <= buffer->bytes)
+        return OVOID_OK;
+    uint64_t limit = device->info.max_allocation;
+    if (bytes > limit)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "%s takes %zu bytes, a buffer of %s holds at most %llu", what, bytes,
+                       device->info.name, (unsigned long long)limit);
+    size_t room = buffer->bytes > SIZE_MAX / 3 ? bytes : buffer->bytes / 2 * 3;
+    if (room < bytes)
+        room = bytes;
+    if (room < SMALLEST_BUFFER)
+        room = SMALLEST_BUFFER;
+    if (room > limit)
+        room = bytes ? bytes : 1;
+    ov_buffer_destroy(buffer);
+    cl_int code = allocate(device, buffer, room);
+    if (code != CL_SUCCESS && bytes && room > bytes)
+        code = allocate(device, buffer, bytes);
+    if (code != CL_SUCCESS)
+        return ov_fail(context,
+                       code == CL_INVALID_BUFFER_SIZE ? OVOID_ERROR_LIMIT : OVOID_ERROR_MEMORY,
+                       "clCreateBuffer: %s (%d) for %s of %zu bytes, device %s", ov_cl_name(code),
+                       (int)code, what, bytes, device->info.name);
+    return OVOID_OK;
+}
+
+void ov_buffer_destroy(ov_buffer *buffer) {
+    if (!buffer)
+        return;
+    if (buffer->memory)
+        clReleaseMemObject(buffer->memory);
+    *buffer = (ov_buffer){0};
+}
+
+static ovoid_status check_range(ovoid_context *context, const ov_buffer *buffer, size_t offset,
+                                size_t bytes) {
+    if (!context->device || offset > buffer->bytes || bytes > buffer->bytes - offset)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "%zu bytes at %zu are outside a buffer of %zu bytes", bytes, offset,
+                       buffer->bytes);
+    return OVOID_OK;
+}
+
+ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t offset,
+                             const void *data, size_t bytes) {
+    if (!bytes)
+        return OVOID_OK;
+    ovoid_status status = check_range(context, buffer, offset, bytes);
+    if (status != OVOID_OK)
+        return status;
+    cl_int code = clEnqueueWriteBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
+                                       bytes, data, 0, NULL, NULL);
+    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
+}
+
+ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, size_t offset,
+                            void *data, size_t bytes) {
+    if (!bytes)
+        return OVOID_OK;
+    ovoid_status status = check_range(context, buffer, offset, bytes);
+    if (status != OVOID_OK)
+        return status;
+    cl_int code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
+                                      bytes, data, 0, NULL, NULL);
+    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+}

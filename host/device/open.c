@@ -1,0 +1,297 @@
+#include "device/internal.h"
+
+#include "shared.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- selectors ---------------------------------------------------------------------------- */
+
+static bool same_text(const char *a, const char *b) {
+    while (*a && tolower((unsigned char)*a) == tolower((unsigned char)*b))
+        a++, b++;
+    return *a == *b;
+}
+
+static bool contains(const char *text, const char *part) {
+    size_t length = strlen(part);
+    for (; *text; text++) {
+        size_t i = 0;
+        while (i < length && tolower((unsigned char)text[i]) == tolower((unsigned char)part[i]))
+            i++;
+        if (i == length)
+            return true;
+    }
+    return false;
+}
+
+/* The selector as an index below count, or count. A larger number may still be part of a name, such
+ * as 4090. */
+static size_t as_index(const char *selector, size_t count) {
+    size_t value = 0;
+    for (const char *c = selector; *c; c++) {
+        if (!isdigit((unsigned char)*c))
+            return count;
+        value = 10 * value + (size_t)(*c - '0');
+        if (value >= count)
+            return count;
+    }
+    return value;
+}
+
+static cl_device_type as_type(const char *selector) {
+    if (same_text(selector, "cpu"))
+        return CL_DEVICE_TYPE_CPU;
+    if (same_text(selector, "gpu"))
+        return CL_DEVICE_TYPE_GPU;
+    return same_text(selector, "accelerator") ? CL_DEVICE_TYPE_ACCELERATOR : 0;
+}
+
+static bool matches(const ov_device_entry *entry, cl_device_type type, const char *selector) {
+    if (type)
+        return (entry->type & type) != 0;
+    return contains(entry->info.name, selector) || contains(entry->info.platform, selector);
+}
+
+/* The first usable entry that matches, else the first that matches, else NULL. */
+static const ov_device_entry *find(const ov_device_entry *entries, size_t count,
+                                   cl_device_type type, const char *selector) {
+    const ov_device_entry *defective = NULL;
+    for (size_t i = 0; i < count; i++) {
+        if (!matches(&entries[i], type, selector))
+            continue;
+        if (!entries[i].defect[0])
+            return &entries[i];
+        if (!defective)
+            defective = &entries[i];
+    }
+    return defective;
+}
+
+static const ov_device_entry *select_named(const ov_device_entry *entries, size_t count,
+                                           const char *selector) {
+    size_t index = as_index(selector, count);
+    if (index < count)
+        return &entries[index];
+    cl_device_type type = as_type(selector);
+    const ov_device_entry *entry = type ? find(entries, count, type, selector) : NULL;
+    return entry ? entry : find(entries, count, 0, selector);
+}
+
+static const ov_device_entry *select_default(const ov_device_entry *entries, size_t count) {
+    const ov_device_entry *first = NULL;
+    for (size_t i = 0; i < count; i++) {
+        if (entries[i].defect[0])
+            continue;
+        if (entries[i].info.type == OVOID_DEVICE_GPU)
+            return &entries[i];
+        if (!first)
+            first = &entries[i];
+    }
+    return first;
+}
+
+static ovoid_status append_list(ovoid_context *context, ov_text *text,
+                                const ov_device_entry *entries, size_t count) {
+    ovoid_status status = OVOID_OK;
+    for (size_t i = 0; i < count && status == OVOID_OK; i++) {
+        const ovoid_device_info *info = &entries[i].info;
+        bool bad = entries[i].defect[0] != '\0';
+        status = ov_text_print(context, text, "\n  %u: %s, %s, platform %s%s%s%s",
+                               (unsigned)info->index, ov_device_type_name(info->type), info->name,
+                               info->platform, bad ? " (" : "", entries[i].defect, bad ? ")" : "");
+    }
+    return status;
+}
+
+static ovoid_status fail_without_devices(ovoid_context *context, size_t platforms) {
+    return ov_fail(context, OVOID_ERROR_DEVICE,
+                   "no OpenCL device found (%zu OpenCL platform%s installed)\n"
+                   "Install an OpenCL driver: pocl-opencl-icd makes the CPU a device on Debian and "
+                   "Ubuntu; a GPU needs its vendor's OpenCL driver, or mesa-opencl-icd. clinfo -l "
+                   "shows what is found.",
+                   platforms, platforms == 1 ? "" : "s");
+}
+
+static ovoid_status fail_without_match(ovoid_context *context, const char *selector,
+                                       const char *origin, const ov_device_entry *entries,
+                                       size_t count) {
+    ov_text text = {0};
+    ovoid_status status = OVOID_OK;
+    if (selector)
+        OV_TRY(ov_text_print(context, &text, "no OpenCL device matches \"%s\"%s; there %s",
+                             selector, origin, count == 1 ? "is:" : "are:"));
+    else
+        OV_TRY(ov_text_print(context, &text, "no OpenCL device can be used; there %s",
+                             count == 1 ? "is:" : "are:"));
+    OV_TRY(append_list(context, &text, entries, count));
+    status = ov_fail(context, OVOID_ERROR_DEVICE, "%s", text.text);
+cleanup:
+    free(text.text);
+    return status;
+}
+
+static ovoid_status choose(ovoid_context *context, const char *selector,
+                           const ov_device_entry *entries, size_t count, size_t platforms,
+                           const ov_device_entry **chosen) {
+    const char *origin = "";
+    if (!selector || !*selector) {
+        selector = getenv("OVOID_DEVICE");
+        origin = " (from OVOID_DEVICE)";
+    }
+    if (selector && !*selector)
+        selector = NULL;
+    if (!count)
+        return fail_without_devices(context, platforms);
+    const ov_device_entry *entry =
+        selector ? select_named(entries, count, selector) : select_default(entries, count);
+    if (!entry)
+        return fail_without_match(context, selector, origin, entries, count);
+    if (entry->defect[0])
+        return ov_fail(context, OVOID_ERROR_DEVICE, "device %u, %s, %s",
+                       (unsigned)entry->info.index, entry->info.name, entry->defect);
+    *chosen = entry;
+    return OVOID_OK;
+}
+
+/* ---- shape -------------------------------------------------------------------------------- */
+
+static bool parse_shape(const char *text, ov_shape *shape) {
+    unsigned vector, lanes;
+    char x, rest;
+    if (!isdigit((unsigned char)text[0]) ||
+        sscanf(text, "%4u%c%4u%c", &vector, &x, &lanes, &rest) != 3 || x != 'x')
+        return false;
+    if (vector != 1 && vector != 4 && vector != 8 && vector != 16)
+        return false;
+    if (!lanes || (lanes & (lanes - 1)) || OV_PACK % (vector * lanes))
+        return false;
+    *shape = (ov_shape){vector, lanes};
+    return true;
+}
+
+static ov_shape natural_shape(const ov_device *device) {
+    ov_shape shape = {1, 1};
+    if (device->info.type == OVOID_DEVICE_GPU) {
+        shape.lanes = OV_PACK;
+        while (shape.lanes > 1 && shape.lanes > device->max_group)
+            shape.lanes /= 2;
+    } else if (device->info.float_width >= 16) {
+        shape.vector = 16;
+    } else if (device->info.float_width >= 8) {
+        shape.vector = 8;
+    } else if (device->info.float_width >= 4) {
+        shape.vector = 4;
+    }
+    return shape;
+}
+
+static ovoid_status set_shape(ovoid_context *context, ov_device *device) {
+    const char *wish = getenv("OVOID_SHAPE");
+    device->shape = natural_shape(device);
+    if (!wish || !*wish)
+        return OVOID_OK;
+    if (!parse_shape(wish, &device->shape))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "OVOID_SHAPE=%s: VxL is needed with V one of 1, 4, 8, 16, L a power of two "
+                       "and V * L a divisor of %d",
+                       wish, OV_PACK);
+    if (device->shape.lanes > device->max_group)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "OVOID_SHAPE=%s: %s runs groups of at most %zu work-items", wish,
+                       device->info.name, device->max_group);
+    return OVOID_OK;
+}
+
+/* ---- opening and closing ------------------------------------------------------------------ */
+
+static void release(ov_device *device) {
+    if (!device)
+        return;
+    ov_programs_release(device);
+    if (device->queue) {
+        clFinish(device->queue);
+        clReleaseCommandQueue(device->queue);
+    }
+    if (device->context)
+        clReleaseContext(device->context);
+    free(device);
+}
+
+void ov_device_close(ovoid_context *context) {
+    if (!context)
+        return;
+    release(context->device);
+    context->device = NULL;
+    context->close_device = NULL;
+}
+
+static ovoid_status make_device(ovoid_context *context, const ov_device_entry *entry,
+                                ov_device **made) {
+    ovoid_status status = OVOID_OK;
+    const char *name = entry->info.name;
+    ov_device *device = ov_alloc(context, 1, sizeof *device, "a device");
+    if (!device)
+        return OVOID_ERROR_MEMORY;
+    device->info = entry->info;
+    device->platform = entry->platform;
+    device->id = entry->id;
+    const char *call = "clGetDeviceInfo";
+    cl_int code = clGetDeviceInfo(device->id, CL_DEVICE_MAX_WORK_GROUP_SIZE,
+                                  sizeof device->max_group, &device->max_group, NULL);
+    if (code == CL_SUCCESS) {
+        const cl_context_properties properties[] = {CL_CONTEXT_PLATFORM,
+                                                    (cl_context_properties)entry->platform, 0};
+        call = "clCreateContext";
+        device->context = clCreateContext(properties, 1, &device->id, NULL, NULL, &code);
+    }
+    if (code == CL_SUCCESS) {
+        call = "clCreateCommandQueue";
+        device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
+    }
+    if (code != CL_SUCCESS) {
+        status = ov_cl_fail_on(context, code, call, NULL, name);
+        goto cleanup;
+    }
+    OV_TRY(set_shape(context, device));
+    *made = device;
+    device = NULL;
+cleanup:
+    release(device);
+    return status;
+}
+
+ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector) {
+    ovoid_status status = OVOID_OK;
+    ov_device_entry *entries = NULL;
+    const ov_device_entry *entry = NULL;
+    ov_device *device = NULL;
+    size_t count = 0, platforms = 0;
+    if (!context)
+        return OVOID_ERROR_ARGUMENT;
+    OV_TRY(ov_devices_list(context, &entries, &count, &platforms));
+    OV_TRY(choose(context, selector, entries, count, platforms, &entry));
+    OV_TRY(make_device(context, entry, &device));
+    ov_device_close(context);
+    context->device = device;
+    context->close_device = ov_device_close;
+cleanup:
+    free(entries);
+    return status;
+}
+
+const ovoid_device_info *ovoid_context_device(const ovoid_context *context) {
+    return context && context->device ? &context->device->info : NULL;
+}
+
+ovoid_status ov_device_get(ovoid_context *context, ov_device **device) {
+    if (!context->device) {
+        ovoid_status status = ovoid_context_open_device(context, NULL);
+        if (status != OVOID_OK)
+            return status;
+    }
+    *device = context->device;
+    return OVOID_OK;
+}

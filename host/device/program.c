@@ -1,0 +1,216 @@
+#include "device/internal.h"
+
+#include "shared.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct ov_program {
+    const char *stem;
+    cl_program handle;
+    struct ov_program *next;
+};
+
+/* ---- sources ------------------------------------------------------------------------------ */
+
+static ovoid_status embedded_source(ovoid_context *context, const char *name, ov_text *text) {
+    for (const ov_source *source = ov_sources; source->name; source++)
+        if (strcmp(source->name, name) == 0)
+            return ov_text_append(context, text, source->text, strlen(source->text));
+    return ov_fail(context, OVOID_ERROR_ARGUMENT, "there is no kernel source %s", name);
+}
+
+static ovoid_status file_source(ovoid_context *context, const char *folder, const char *name,
+                                ov_text *text) {
+    ovoid_status status = OVOID_OK;
+    ov_text path = {0};
+    FILE *file = NULL;
+    char block[4096];
+    size_t got;
+    OV_TRY(ov_text_print(context, &path, "%s/%s", folder, name));
+    file = fopen(path.text, "rb");
+    if (!file) {
+        status = ov_fail(context, OVOID_ERROR_IO, "%s: %s (the folder is OVOID_KERNEL_DIR)",
+                         path.text, strerror(errno));
+        goto cleanup;
+    }
+    while ((got = fread(block, 1, sizeof block, file)) > 0)
+        OV_TRY(ov_text_append(context, text, block, got));
+    if (ferror(file))
+        status = ov_fail(context, OVOID_ERROR_IO, "%s: %s", path.text, strerror(errno));
+cleanup:
+    if (file)
+        fclose(file);
+    free(path.text);
+    return status;
+}
+
+/* Appends one file, with a #line so that the compiler names it in its messages. */
+static ovoid_status append_source(ovoid_context *context, const char *name, ov_text *text) {
+    const char *folder = getenv("OVOID_KERNEL_DIR");
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_text_print(context, text, "#line 1 \"%s\"\n", name));
+    if (folder && *folder)
+        OV_TRY(file_source(context, folder, name, text));
+    else
+        OV_TRY(embedded_source(context, name, text));
+    OV_TRY(ov_text_append(context, text, "\n", 1));
+cleanup:
+    return status;
+}
+
+static ovoid_status program_source(ovoid_context *context, const char *stem, ov_text *text) {
+    ovoid_status status = OVOID_OK;
+    ov_text name = {0};
+    OV_TRY(ov_text_print(context, &name, "%s.cl", stem));
+    OV_TRY(append_source(context, "shared.h", text));
+    OV_TRY(append_source(context, "vector.clh", text));
+    OV_TRY(append_source(context, name.text, text));
+cleanup:
+    free(name.text);
+    return status;
+}
+
+/* ---- building ----------------------------------------------------------------------------- */
+
+static void read_log(ovoid_context *context, const ov_device *device, cl_program handle,
+                     ov_text *log) {
+    size_t bytes = 0;
+    if (clGetProgramBuildInfo(handle, device->id, CL_PROGRAM_BUILD_LOG, 0, NULL, &bytes) !=
+            CL_SUCCESS ||
+        !bytes)
+        return;
+    char *text = ov_alloc(context, bytes + 1, 1, "a build log");
+    if (!text)
+        return;
+    if (clGetProgramBuildInfo(handle, device->id, CL_PROGRAM_BUILD_LOG, bytes, text, NULL) ==
+        CL_SUCCESS) {
+        size_t length = strlen(text);
+        while (length && (text[length - 1] == '\n' || text[length - 1] == ' '))
+            length--;
+        ov_text_append(context, log, text, length);
+    }
+    free(text);
+}
+
+static ovoid_status fail_build(ovoid_context *context, const ov_device *device, const char *stem,
+                               cl_program handle, cl_int code, const char *options) {
+    ov_text log = {0};
+    read_log(context, device, handle, &log);
+    ovoid_status status =
+        ov_fail(context, OVOID_ERROR_OPENCL,
+                "clBuildProgram: %s (%d), program %s.cl, device %s, driver %s\noptions: %s\n%s",
+                ov_cl_name(code), (int)code, stem, device->info.name, device->info.driver, options,
+                log.length ? log.text : "(no build log)");
+    free(log.text);
+    return status;
+}
+
+static ovoid_status build_source(ovoid_context *context, const ov_device *device, const char *stem,
+                                 const ov_text *source, const char *options, cl_program *built) {
+    cl_int code;
+    const char *text = source->text;
+    size_t length = source->length;
+    cl_program handle = clCreateProgramWithSource(device->context, 1, &text, &length, &code);
+    if (code != CL_SUCCESS)
+        return ov_cl_fail(context, code, "clCreateProgramWithSource", stem);
+    code = clBuildProgram(handle, 1, &device->id, options, NULL, NULL);
+    if (code != CL_SUCCESS) {
+        ovoid_status status = fail_build(context, device, stem, handle, code, options);
+        clReleaseProgram(handle);
+        return status;
+    }
+    *built = handle;
+    return OVOID_OK;
+}
+
+static ovoid_status make_program(ovoid_context *context, ov_device *device, const char *stem,
+                                 cl_program *handle) {
+    ovoid_status status = OVOID_OK;
+    ov_text source = {0};
+    char options[128];
+    snprintf(options, sizeof options, "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d",
+             (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK);
+    OV_TRY(program_source(context, stem, &source));
+    OV_TRY(build_source(context, device, stem, &source, options, handle));
+cleanup:
+    free(source.text);
+    return status;
+}
+
+static ovoid_status get_program(ovoid_context *context, ov_device *device, const char *stem,
+                                cl_program *handle) {
+    for (struct ov_program *p = device->programs; p; p = p->next) {
+        if (strcmp(p->stem, stem) == 0) {
+            *handle = p->handle;
+            return OVOID_OK;
+        }
+    }
+    struct ov_program *program = ov_alloc(context, 1, sizeof *program, "a program");
+    if (!program)
+        return OVOID_ERROR_MEMORY;
+    ovoid_status status = make_program(context, device, stem, &program->handle);
+    if (status != OVOID_OK) {
+        free(program);
+        return status;
+    }
+    program->stem = stem;
+    program->next = device->programs;
+    device->programs = program;
+    *handle = program->handle;
+    return OVOID_OK;
+}
+
+void ov_programs_release(ov_device *device) {
+    while (device->programs) {
+        struct ov_program *program = device->programs;
+        device->programs = program->next;
+        clReleaseProgram(program->handle);
+        free(program);
+    }
+}
+
+/* ---- kernels ------------------------------------------------------------------------------ */
+
+ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const char *name,
+                              ov_kernel *kernel) {
+    ov_device *device;
+    cl_program handle;
+    ovoid_status status = ov_device_get(context, &device);
+    if (status == OVOID_OK)
+        status = get_program(context, device, program, &handle);
+    if (status != OVOID_OK)
+        return status;
+    cl_int code;
+    ov_kernel made = {.program = program, .name = name};
+    made.handle = clCreateKernel(handle, name, &code);
+    if (code != CL_SUCCESS)
+        return ov_fail(context, OVOID_ERROR_OPENCL,
+                       "clCreateKernel: %s (%d), kernel %s of %s.cl, device %s", ov_cl_name(code),
+                       (int)code, name, program, device->info.name);
+    cl_uint arg_count = 0;
+    const char *call = "clGetKernelInfo";
+    code = clGetKernelInfo(made.handle, CL_KERNEL_NUM_ARGS, sizeof arg_count, &arg_count, NULL);
+    if (code == CL_SUCCESS) {
+        call = "clGetKernelWorkGroupInfo";
+        code = clGetKernelWorkGroupInfo(made.handle, device->id, CL_KERNEL_WORK_GROUP_SIZE,
+                                        sizeof made.max_group, &made.max_group, NULL);
+    }
+    if (code != CL_SUCCESS) {
+        ov_kernel_destroy(&made);
+        return ov_cl_fail(context, code, call, name);
+    }
+    made.arg_count = arg_count;
+    *kernel = made;
+    return OVOID_OK;
+}
+
+void ov_kernel_destroy(ov_kernel *kernel) {
+    if (!kernel)
+        return;
+    if (kernel->handle)
+        clReleaseKernel(kernel->handle);
+    *kernel = (ov_kernel){0};
+}

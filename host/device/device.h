@@ -18,6 +18,13 @@ typedef struct ov_shape {
     uint32_t lanes;  /* work-items that share a pack or an ellipsoid: 1 on CPUs, 32 on GPUs */
 } ov_shape;
 
+/* Environment variables for development and tests:
+ *   OVOID_SHAPE       "VxL", such as 1x32 or 4x1, instead of the device's own shape: V one of 1, 4,
+ * 8, 16, L a power of two, V * L a divisor of OV_PACK OVOID_KERNEL_DIR  folder with the kernel
+ * sources, all of them, instead of the embedded ones OVOID_CACHE       auto (default), on or off:
+ * whether compiled programs are kept. auto leaves that to drivers with a cache of their own (PoCL)
+ *   OVOID_CACHE_DIR   where they are kept, instead of $XDG_CACHE_HOME/ovoid or ~/.cache/ovoid */
+
 typedef struct ov_device {
     ovoid_device_info info;
     cl_platform_id platform;
@@ -28,7 +35,9 @@ typedef struct ov_device {
     size_t max_group;            /* largest work-group */
     uint64_t launches;           /* kernels enqueued since the device was opened */
     struct ov_program *programs; /* built so far, a list */
-    bool cache_warned;           /* the user knows that the program cache does not work */
+    uint32_t built;              /* programs compiled from source so far */
+    uint32_t loaded;             /* programs taken from the cache so far */
+    bool cache_told;             /* the user knows that the cache does not work */
 } ov_device;
 
 /* The context's device, opening the default one if none is open yet. */

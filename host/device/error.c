@@ -1,10 +1,5 @@
 #include "device/internal.h"
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-/* Codes of extensions that the OpenCL 1.2 headers lack; values from the Khronos registry. */
 static const struct {
     cl_int code;
     const char *name;
@@ -122,35 +117,4 @@ ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call
 ovoid_status ov_cl_fail(ovoid_context *context, cl_int code, const char *call, const char *kernel) {
     const ov_device *device = context ? context->device : NULL;
     return ov_cl_fail_on(context, code, call, kernel, device ? device->info.name : NULL);
-}
-
-ovoid_status ov_text_append(ovoid_context *context, ov_text *text, const char *bytes,
-                            size_t length) {
-    ovoid_status status =
-        ov_grow(context, &text->text, &text->capacity, text->length + length + 1, 1, "a text");
-    if (status != OVOID_OK)
-        return status;
-    if (length)
-        memcpy(text->text + text->length, bytes, length);
-    text->length += length;
-    text->text[text->length] = '\0';
-    return OVOID_OK;
-}
-
-ovoid_status ov_text_print(ovoid_context *context, ov_text *text, const char *format, ...) {
-    va_list args;
-    va_start(args, format);
-    int length = vsnprintf(NULL, 0, format, args);
-    va_end(args);
-    if (length < 0)
-        return ov_fail(context, OVOID_ERROR_MEMORY, "a text cannot be formatted");
-    ovoid_status status = ov_grow(context, &text->text, &text->capacity,
-                                  text->length + (size_t)length + 1, 1, "a text");
-    if (status != OVOID_OK)
-        return status;
-    va_start(args, format);
-    vsnprintf(text->text + text->length, (size_t)length + 1, format, args);
-    va_end(args);
-    text->length += (size_t)length;
-    return OVOID_OK;
 }

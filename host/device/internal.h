@@ -15,7 +15,7 @@ ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call
 
 /* ---- text --------------------------------------------------------------------------------- */
 
-/* A growing text; {0} is an empty one. `text` is NULL or ends with a null byte. */
+/* A growing text, or bytes; {0} is an empty one. `text` is NULL or ends with a null byte. */
 typedef struct ov_text {
     char *text;
     size_t length;
@@ -29,6 +29,9 @@ __attribute__((format(printf, 3, 4)))
 #endif
 ovoid_status
 ov_text_print(ovoid_context *context, ov_text *text, const char *format, ...);
+
+/* Appends the contents of a regular file. */
+ovoid_status ov_text_read(ovoid_context *context, ov_text *text, const char *path);
 
 /* ---- devices ------------------------------------------------------------------------------ */
 
@@ -72,20 +75,19 @@ extern const ov_source ov_sources[];
 /* Releases all programs of the device. */
 void ov_programs_release(ov_device *device);
 
-/* What a cached program was made from and for; compared byte by byte on reading. */
-typedef struct ov_cache_entry {
-    const char *program;
-    ov_text key;
-} ov_cache_entry;
+/* The cache of compiled programs: one file <program>-<hash of key>.bin each, which holds the whole
+ * key and a checksum, so that neither a collision nor a damaged file can pass for a program. The
+ * key is everything that the binary depends on. */
 
-/* Reads the binary of the entry; NULL when there is none that fits. Free with free(). */
-unsigned char *ov_cache_read(ov_device *device, const ov_cache_entry *entry, size_t *bytes);
+/* Whether OVOID_CACHE ("off", "on" or "auto") and the driver call for the cache. "auto" leaves it
+ * to drivers that have their own. An unknown value is worth a warning and counts as "auto". */
+bool ov_cache_wanted(ovoid_context *context, ov_device *device);
+
+/* Reads the binary kept under the key into `binary`. False when there is none that is whole. */
+bool ov_cache_read(const char *program, const ov_text *key, ov_text *binary);
 
 /* Keeps a binary. Failing costs speed alone: it is worth one warning per device. */
-void ov_cache_write(ovoid_context *context, ov_device *device, const ov_cache_entry *entry,
-                    const unsigned char *binary, size_t bytes);
-
-/* Whether OVOID_CACHE and the driver call for the cache. An unknown value counts as "auto". */
-bool ov_cache_wanted(const ov_device *device);
+void ov_cache_write(ovoid_context *context, ov_device *device, const char *program,
+                    const ov_text *key, const unsigned char *binary, size_t bytes);
 
 #endif

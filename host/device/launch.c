@@ -73,6 +73,8 @@ ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t
     if (buffer->memory && bytes <= buffer->bytes)
         return OVOID_OK;
     uint64_t limit = device->info.max_allocation;
+    if (!limit) /* the driver does not say */
+        limit = SIZE_MAX;
     if (bytes > limit)
         return ov_fail(context, OVOID_ERROR_LIMIT,
                        "%s takes %zu bytes, a buffer of %s holds at most %llu", what, bytes,

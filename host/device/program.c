@@ -2,7 +2,6 @@
 
 #include "shared.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,23 +25,9 @@ static ovoid_status file_source(ovoid_context *context, const char *folder, cons
                                 ov_text *text) {
     ovoid_status status = OVOID_OK;
     ov_text path = {0};
-    FILE *file = NULL;
-    char block[4096];
-    size_t got;
     OV_TRY(ov_text_print(context, &path, "%s/%s", folder, name));
-    file = fopen(path.text, "rb");
-    if (!file) {
-        status = ov_fail(context, OVOID_ERROR_IO, "%s: %s (the folder is OVOID_KERNEL_DIR)",
-                         path.text, strerror(errno));
-        goto cleanup;
-    }
-    while ((got = fread(block, 1, sizeof block, file)) > 0)
-        OV_TRY(ov_text_append(context, text, block, got));
-    if (ferror(file))
-        status = ov_fail(context, OVOID_ERROR_IO, "%s: %s", path.text, strerror(errno));
+    OV_TRY(ov_text_read(context, text, path.text));
 cleanup:
-    if (file)
-        fclose(file);
     free(path.text);
     return status;
 }
@@ -71,6 +56,75 @@ static ovoid_status program_source(ovoid_context *context, const char *stem, ov_
 cleanup:
     free(name.text);
     return status;
+}
+
+/* ---- binaries ----------------------------------------------------------------------------- */
+
+static ovoid_status append_platform(ov_text *key, cl_platform_id id, cl_platform_info what) {
+    char text[1024] = "";
+    if (clGetPlatformInfo(id, what, sizeof text, text, NULL) != CL_SUCCESS)
+        return OVOID_ERROR_OPENCL;
+    return ov_text_append(NULL, key, text, strlen(text) + 1);
+}
+
+static ovoid_status append_device(ov_text *key, cl_device_id id, cl_device_info what) {
+    char text[1024] = "";
+    if (clGetDeviceInfo(id, what, sizeof text, text, NULL) != CL_SUCCESS)
+        return OVOID_ERROR_OPENCL;
+    return ov_text_append(NULL, key, text, strlen(text) + 1);
+}
+
+/* All that a binary depends on, each part with its null byte. Failing means no caching. */
+static ovoid_status binary_key(const ov_device *device, const char *options, const ov_text *source,
+                               ov_text *key) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(append_platform(key, device->platform, CL_PLATFORM_NAME));
+    OV_TRY(append_platform(key, device->platform, CL_PLATFORM_VERSION));
+    OV_TRY(append_device(key, device->id, CL_DEVICE_NAME));
+    OV_TRY(append_device(key, device->id, CL_DEVICE_VENDOR));
+    OV_TRY(append_device(key, device->id, CL_DEVICE_VERSION));
+    OV_TRY(append_device(key, device->id, CL_DRIVER_VERSION));
+    OV_TRY(ov_text_append(NULL, key, options, strlen(options) + 1));
+    OV_TRY(ov_text_append(NULL, key, source->text, source->length));
+cleanup:
+    return status;
+}
+
+/* The program from the cache, NULL when it has none that the driver takes. */
+static cl_program load_binary(const ov_device *device, const char *stem, const ov_text *key,
+                              const char *options) {
+    ov_text binary = {0};
+    cl_program handle = NULL;
+    if (ov_cache_read(stem, key, &binary)) {
+        cl_int code, taken = CL_SUCCESS;
+        const unsigned char *bytes = (const unsigned char *)binary.text;
+        handle = clCreateProgramWithBinary(device->context, 1, &device->id, &binary.length, &bytes,
+                                           &taken, &code);
+        if (code != CL_SUCCESS)
+            handle = NULL;
+        if (handle && (taken != CL_SUCCESS ||
+                       clBuildProgram(handle, 1, &device->id, options, NULL, NULL) != CL_SUCCESS)) {
+            clReleaseProgram(handle);
+            handle = NULL;
+        }
+    }
+    free(binary.text);
+    return handle;
+}
+
+/* A driver that hands out no binary is left alone: its programs are built anew each time. */
+static void keep_binary(ovoid_context *context, ov_device *device, const char *stem,
+                        const ov_text *key, cl_program handle) {
+    size_t bytes = 0;
+    if (clGetProgramInfo(handle, CL_PROGRAM_BINARY_SIZES, sizeof bytes, &bytes, NULL) !=
+            CL_SUCCESS ||
+        !bytes)
+        return;
+    unsigned char *binary = malloc(bytes);
+    if (binary &&
+        clGetProgramInfo(handle, CL_PROGRAM_BINARIES, sizeof binary, &binary, NULL) == CL_SUCCESS)
+        ov_cache_write(context, device, stem, key, binary, bytes);
+    free(binary);
 }
 
 /* ---- building ----------------------------------------------------------------------------- */
@@ -129,14 +183,28 @@ static ovoid_status build_source(ovoid_context *context, const ov_device *device
 static ovoid_status make_program(ovoid_context *context, ov_device *device, const char *stem,
                                  cl_program *handle) {
     ovoid_status status = OVOID_OK;
-    ov_text source = {0};
+    ov_text source = {0}, key = {0};
+    cl_program made = NULL;
     char options[128];
     snprintf(options, sizeof options, "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d",
              (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK);
     OV_TRY(program_source(context, stem, &source));
-    OV_TRY(build_source(context, device, stem, &source, options, handle));
+    bool cache =
+        ov_cache_wanted(context, device) && binary_key(device, options, &source, &key) == OVOID_OK;
+    if (cache)
+        made = load_binary(device, stem, &key, options);
+    if (made) {
+        device->loaded++;
+    } else {
+        OV_TRY(build_source(context, device, stem, &source, options, &made));
+        device->built++;
+        if (cache)
+            keep_binary(context, device, stem, &key, made);
+    }
+    *handle = made;
 cleanup:
     free(source.text);
+    free(key.text);
     return status;
 }
 

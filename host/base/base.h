@@ -1,0 +1,57 @@
+/*
+ * What every room stands on: the context with its last error, allocation that reports, time.
+ * Internal names begin with ov_; only ovoid_ names are exported.
+ */
+#ifndef OV_BASE_H
+#define OV_BASE_H
+
+#include "ovoid/ovoid.h"
+
+#include <stdarg.h>
+
+struct ov_device; /* host/device/device.h */
+
+struct ovoid_context {
+    char *error;         /* last failure, owned, may be NULL */
+    ovoid_warning_fn warn;
+    void *warn_user;
+    struct ov_device *device; /* NULL until opened */
+    void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */
+};
+
+/* Records the failure text (printf style) and returns status. context may be NULL. If even the text
+ * cannot be stored, a fixed text stands in for it. */
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4)))
+#endif
+ovoid_status
+ov_fail(ovoid_context *context, ovoid_status status, const char *format, ...);
+
+#if defined(__GNUC__)
+__attribute__((format(printf, 2, 3)))
+#endif
+void
+ov_warn(ovoid_context *context, const char *format, ...);
+
+/* calloc of count * size bytes with overflow check (at least one byte). On failure returns NULL and
+ * records OVOID_ERROR_MEMORY with `what`. Free with free(). */
+void *ov_alloc(ovoid_context *context, size_t count, size_t size, const char *what);
+
+/* Grows *array to hold at least `need` elements of `size` bytes; *capacity counts elements. Growth is
+ * geometric. The new part is not cleared. */
+ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capacity, size_t need,
+                     size_t size, const char *what);
+
+/* Seconds of a monotonic clock. */
+double ov_seconds(void);
+
+/* Runs `expression` (an ovoid_status) and jumps to `cleanup` unless it is OVOID_OK; needs a local
+ * variable `status`. */
+#define OV_TRY(expression)                                                                         \
+    do {                                                                                           \
+        status = (expression);                                                                     \
+        if (status != OVOID_OK)                                                                    \
+            goto cleanup;                                                                          \
+    } while (0)
+
+#endif

@@ -1,0 +1,341 @@
+/*
+ * Ovoid: sparse ellipsoid-Gaussian representation of molecular surfaces.
+ *
+ * The field of a molecule is phi(x) = sum_i exp(-d (|x - x_i|^2 - r_i^2)), its Gaussian surface the
+ * level set phi = c (Gui, Chen, Lu, "Sparse Representation of Gaussian Molecular Surface",
+ * arXiv:1909.09095, eqs. 1.1 and 1.2). A model is a list of ellipsoids whose field
+ * sum_i a_i exp(-(x - mu_i)^T A_i (x - mu_i)) has nearly the same surface with far fewer terms.
+ *
+ * Conventions of every function here:
+ * - Lengths are in angstrom, areas in angstrom^2, decay rates in angstrom^-2, angles in radian,
+ *   times in second. Coordinates are those of the input file.
+ * - A function that can fail returns an ovoid_status. On failure its outputs are untouched and
+ *   ovoid_context_error() describes what happened, with file, line, OpenCL call or device.
+ * - xxx_destroy(xxx **) frees, sets the pointer to NULL, and accepts NULL and repeats. Whatever a
+ *   function hands out as a pointer to const belongs to the object it came from.
+ * - The library prints nothing, never exits and installs no signal handler.
+ * - A context and what is made with it may be used by one thread at a time; different contexts are
+ *   independent.
+ */
+#ifndef OVOID_OVOID_H
+#define OVOID_OVOID_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(__GNUC__)
+#define OVOID_API __attribute__((visibility("default")))
+#else
+#define OVOID_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- status ------------------------------------------------------------------------------- */
+
+typedef enum ovoid_status {
+    OVOID_OK = 0,
+    OVOID_ERROR_ARGUMENT,  /* an argument or option is out of its range */
+    OVOID_ERROR_MEMORY,    /* the host or the device is out of memory */
+    OVOID_ERROR_IO,        /* a file cannot be opened, read or written */
+    OVOID_ERROR_FORMAT,    /* a file's contents are not what its format asks for */
+    OVOID_ERROR_EMPTY,     /* a molecule or model without any atom or ellipsoid that counts */
+    OVOID_ERROR_DEVICE,    /* no OpenCL device, or none that matches the selector */
+    OVOID_ERROR_OPENCL,    /* an OpenCL call failed or a kernel did not build */
+    OVOID_ERROR_CANCELLED, /* a progress callback asked to stop */
+    OVOID_ERROR_LIMIT,     /* the job is larger than an implementation limit */
+    OVOID_ERROR_NUMERIC    /* the computation produced a value that is not finite */
+} ovoid_status;
+
+/* Version of the library, "MAJOR.MINOR.PATCH". */
+OVOID_API const char *ovoid_version(void);
+
+/* Short lower-case name of a status, e.g. "format"; "unknown" for other values. */
+OVOID_API const char *ovoid_status_name(ovoid_status status);
+
+/* ---- context ------------------------------------------------------------------------------ */
+
+/* Holds the last error and, once opened, the device with its compiled programs and buffers. */
+typedef struct ovoid_context ovoid_context;
+
+/* Creates a context; opens no device yet. */
+OVOID_API ovoid_status ovoid_context_create(ovoid_context **context);
+OVOID_API void ovoid_context_destroy(ovoid_context **context);
+
+/* Text of the last failure in this context, "" when there was none. One or more lines, no newline
+ * at the end. Valid until the next failure or the context's end. */
+OVOID_API const char *ovoid_context_error(const ovoid_context *context);
+
+/* Called with one line of text for each condition that does not stop the work, such as an OpenCL
+ * platform that does not answer or a program cache that cannot be written. NULL ignores them. */
+typedef void (*ovoid_warning_fn)(const char *text, void *user);
+OVOID_API void ovoid_context_on_warning(ovoid_context *context, ovoid_warning_fn fn, void *user);
+
+/* ---- devices ------------------------------------------------------------------------------ */
+
+typedef enum ovoid_device_type {
+    OVOID_DEVICE_CPU,
+    OVOID_DEVICE_GPU,
+    OVOID_DEVICE_ACCELERATOR,
+    OVOID_DEVICE_OTHER
+} ovoid_device_type;
+
+typedef struct ovoid_device_info {
+    uint32_t index; /* position in the list of all devices of all platforms, from 0 */
+    ovoid_device_type type;
+    char name[128];
+    char vendor[128];
+    char platform[128];
+    char driver[64];         /* driver version */
+    char opencl[64];         /* e.g. "OpenCL 3.0 ..." as the device reports it */
+    uint32_t compute_units;
+    uint32_t clock_mhz;
+    uint32_t float_width;    /* preferred vector width for float */
+    bool fp64;               /* double precision in kernels; Ovoid does not need it */
+    uint64_t global_memory;  /* bytes, as the driver reports them */
+    uint64_t max_allocation; /* bytes of one buffer */
+} ovoid_device_info;
+
+/* Lists every device of every platform. A platform that fails is skipped with a warning. *devices is
+ * an array of *count entries to be freed with ovoid_free(). No device at all is not an error here:
+ * *count is 0 and *devices NULL. */
+OVOID_API ovoid_status ovoid_devices(ovoid_context *context, ovoid_device_info **devices,
+                                     size_t *count);
+
+/* Opens the device that selector names: an index ("0"), a type ("cpu", "gpu", "accelerator") or part
+ * of a device or platform name in any case. NULL or "" takes the environment variable OVOID_DEVICE,
+ * and without it the first GPU, else the first device. The first device whose match is found is
+ * taken. Replaces the device opened before; objects made on that one must be gone. */
+OVOID_API ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector);
+
+/* The opened device, NULL before one is opened. */
+OVOID_API const ovoid_device_info *ovoid_context_device(const ovoid_context *context);
+
+/* Frees memory that the library handed over; NULL is fine. */
+OVOID_API void ovoid_free(void *memory);
+
+/* ---- molecules ---------------------------------------------------------------------------- */
+
+typedef struct ovoid_molecule ovoid_molecule;
+
+/* Formats of molecule files. AUTO goes by the extension (.pqr, .xyzr; .gz of each), and where that
+ * says nothing, by the contents. */
+typedef enum ovoid_molecule_format {
+    OVOID_MOLECULE_AUTO = 0,
+    OVOID_MOLECULE_PQR,
+    OVOID_MOLECULE_XYZR
+} ovoid_molecule_format;
+
+/* What a reader met. */
+typedef struct ovoid_molecule_counts {
+    uint64_t lines;        /* lines read */
+    uint64_t atoms;        /* atoms in the molecule */
+    uint64_t zero_radius;  /* of these, with radius 0 */
+    uint64_t skipped;      /* records that hold an atom but were left out, and why: */
+    uint64_t skipped_models;     /* ... in MODEL 2 and later */
+    uint64_t skipped_altlocs;    /* ... reserved for formats with alternate locations */
+} ovoid_molecule_counts;
+
+/* Reads a molecule; gzip is recognised by content; "-" is standard input. A bad line is
+ * OVOID_ERROR_FORMAT with "file:line:column: reason". A file without atoms is OVOID_ERROR_EMPTY. */
+OVOID_API ovoid_status ovoid_molecule_read(ovoid_context *context, const char *path,
+                                           ovoid_molecule_format format, ovoid_molecule **molecule);
+
+/* Makes a molecule of `atoms` atoms from xyzr[4 * i + {0, 1, 2, 3}] = x, y, z, radius (angstrom).
+ * Values must be finite and radii not negative; the array is copied. */
+OVOID_API ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr,
+                                             size_t atoms, ovoid_molecule **molecule);
+
+OVOID_API void ovoid_molecule_destroy(ovoid_molecule **molecule);
+
+OVOID_API size_t ovoid_molecule_atoms(const ovoid_molecule *molecule);
+
+/* x, y, z, radius of all atoms, 4 * atoms values, in the order of the file. */
+OVOID_API const double *ovoid_molecule_xyzr(const ovoid_molecule *molecule);
+
+OVOID_API ovoid_molecule_counts ovoid_molecule_read_counts(const ovoid_molecule *molecule);
+
+/* ---- output files -------------------------------------------------------------------------- */
+
+/* A file that is whole or absent: its bytes go to a temporary file in the same folder, which takes
+ * the final name at the end. Symbolic links are followed and stay, and a file that is replaced keeps
+ * its permissions. "-" is standard output. What exists and is no regular file (a device, a FIFO) is
+ * written in place. ovoid_model_write() writes this way; so can what goes beside a model. */
+typedef struct ovoid_file ovoid_file;
+
+/* OVOID_ERROR_IO if a file could not be written at `path` now, with the reason: no such folder, no
+ * permission, a folder in its place. Changes nothing; made to be asked before long work. */
+OVOID_API ovoid_status ovoid_file_check(ovoid_context *context, const char *path);
+
+OVOID_API ovoid_status ovoid_file_create(ovoid_context *context, const char *path,
+                                         ovoid_file **file);
+
+/* Appends `bytes` bytes, buffered. */
+OVOID_API ovoid_status ovoid_file_write(ovoid_context *context, ovoid_file *file, const void *data,
+                                        size_t bytes);
+
+/* Path of the temporary file, NULL when there is none (any more). For signal handlers, which cannot
+ * call ovoid_file_destroy() but may unlink(). */
+OVOID_API const char *ovoid_file_temporary(const ovoid_file *file);
+
+/* Writes out what is buffered and gives the file its name. On success and on failure alike the file
+ * takes no more data; on failure nothing is left of it. */
+OVOID_API ovoid_status ovoid_file_commit(ovoid_context *context, ovoid_file *file);
+
+/* Drops the file; one that was not committed leaves nothing behind. */
+OVOID_API void ovoid_file_destroy(ovoid_file **file);
+
+/* ---- field -------------------------------------------------------------------------------- */
+
+#define OVOID_DEFAULT_DECAY 0.5    /* d, angstrom^-2 (section 3.2.3 of the paper) */
+#define OVOID_DEFAULT_ISOVALUE 1.0 /* c (Table 2 of the paper) */
+
+/* phi and, unless gradient is NULL, its gradient at `count` points xyz[3 * k + {0, 1, 2}], computed
+ * on the device in single precision about the molecule's middle. value has count entries, gradient
+ * 3 * count. Relative error of phi about 1e-6. decay in angstrom^-2. */
+OVOID_API ovoid_status ovoid_molecule_field(ovoid_context *context, const ovoid_molecule *molecule,
+                                            double decay, const double *xyz, size_t count,
+                                            double *value, double *gradient);
+
+/* ---- models ------------------------------------------------------------------------------- */
+
+/* One ellipsoid in the paper's convention: amplitude * exp(-(x - centre)^T A (x - centre)) with
+ * A = R^T diag(decay) R and R = R_z(angle[2]) R_y(angle[1]) R_x(angle[0]), the paper's signs (eqs.
+ * 2.11 to 2.14; its R_y is the transpose of the usual one). */
+typedef struct ovoid_ellipsoid {
+    double amplitude; /* a > 0 */
+    double decay[3];  /* angstrom^-2, > 0 */
+    double centre[3]; /* angstrom */
+    double angle[3];  /* alpha, beta, gamma, radian */
+} ovoid_ellipsoid;
+
+typedef struct ovoid_model ovoid_model;
+
+/* Makes a model of `count` ellipsoids (copied) that stands for a surface with this decay rate and
+ * isovalue. Values must be finite, amplitudes and decay rates positive. */
+OVOID_API ovoid_status ovoid_model_create(ovoid_context *context, const ovoid_ellipsoid *ellipsoids,
+                                          size_t count, double decay, double isovalue,
+                                          ovoid_model **model);
+OVOID_API void ovoid_model_destroy(ovoid_model **model);
+
+OVOID_API size_t ovoid_model_size(const ovoid_model *model);
+OVOID_API const ovoid_ellipsoid *ovoid_model_ellipsoids(const ovoid_model *model);
+OVOID_API double ovoid_model_decay(const ovoid_model *model);
+OVOID_API double ovoid_model_isovalue(const ovoid_model *model);
+
+/* Header lines of a model file, "key: value" each, without '#'. NULL past the end. They come from
+ * the file read, or from ovoid_model_annotate(). */
+OVOID_API const char *ovoid_model_note(const ovoid_model *model, size_t index);
+
+/* Adds a header line; key and value hold no line breaks. */
+OVOID_API ovoid_status ovoid_model_annotate(ovoid_context *context, ovoid_model *model,
+                                            const char *key, const char *value);
+
+/* Reads a model file (.ovoid). "-" is standard input. Bad lines are OVOID_ERROR_FORMAT with
+ * "file:line:column: reason". */
+OVOID_API ovoid_status ovoid_model_read(ovoid_context *context, const char *path,
+                                        ovoid_model **model);
+
+/* Writes a model file: '#' header lines, a column line, one ellipsoid per line with nine significant
+ * digits. "-" is standard output. A file is written beside its final place and renamed, so that
+ * `path` never holds half a model. */
+OVOID_API ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model,
+                                         const char *path);
+
+/* As ovoid_molecule_field(), for the model's field. */
+OVOID_API ovoid_status ovoid_model_field(ovoid_context *context, const ovoid_model *model,
+                                         const double *xyz, size_t count, double *value,
+                                         double *gradient);
+
+/* ---- fitting ------------------------------------------------------------------------------ */
+
+typedef enum ovoid_method {
+    OVOID_METHOD_L1 = 0 /* the paper's Algorithm 1 */
+} ovoid_method;
+
+/* What a progress callback sees after each iteration. */
+typedef struct ovoid_progress {
+    const char *stage;      /* "sample", "sparse" or "accuracy" */
+    uint64_t iteration;     /* 1 .. iterations; 0 while sampling */
+    uint64_t iterations;    /* how many there will be at most */
+    uint64_t ellipsoids;
+    uint64_t points;
+    double accuracy_term;   /* E_s = sum_k (phi~ - phi)^2 over the constrained points */
+    double sparse_term;     /* E_l1 = sum_i |c_i| + |d_i1| + |d_i2| + |d_i3|, square-root variables */
+    double accuracy_weight; /* w_s */
+    double sparse_weight;   /* w_l */
+    double objective;       /* w_s E_s + w_l E_l1 */
+    double max_error;       /* max_k |phi~ - phi| */
+    double step;            /* tau of the line search, 0 where no descent was found */
+    double seconds;         /* since the fit began */
+} ovoid_progress;
+
+/* Returns true to go on, false to stop with OVOID_ERROR_CANCELLED. */
+typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
+
+/* Constants of the paper's Algorithm 1. Those marked "open" are not given in the paper. */
+typedef struct ovoid_l1_options {
+    uint32_t iterations;        /* MaxNiter: 8000 (section 4.1, ADP) */
+    uint32_t sparse_iterations; /* SparseNiter: 6000 (section 4.1, ADP) */
+    double epsilon;             /* lower bound of w_s in step 5.4 (open) */
+    double max_error;           /* gate of step 5.5: 0.5 */
+    double prune_below;         /* tol of step 5.1: |c~| under it is deleted: 1e-3 */
+    uint32_t prune_every;       /* iterations between deletions: 20 */
+    double armijo;              /* sufficient decrease of the line search (open): 1e-4 */
+    double shrink;              /* factor of a rejected step (open): 0.5 */
+    double grow;                /* first step tried, over the last accepted one (open): 2 */
+    uint32_t max_backtracks;    /* trial steps of one search before giving up (open): 30 */
+} ovoid_l1_options;
+
+typedef struct ovoid_fit_options {
+    ovoid_method method;
+    double decay;    /* d, angstrom^-2 */
+    double isovalue; /* c */
+    double spacing;  /* of the lattice of constrained points, angstrom (open) */
+    double padding;  /* of the box about the atom centres, angstrom (open) */
+    ovoid_l1_options l1;
+    ovoid_progress_fn progress; /* may be NULL */
+    void *user;
+} ovoid_fit_options;
+
+/* Where the time of a fit went, and how much was done. The seconds are measured on the host between
+ * waits for the device, so they include launches. */
+typedef struct ovoid_fit_profile {
+    double lists_seconds;    /* building the pack lists */
+    double field_seconds;    /* phi~ and the residual, including every trial step */
+    double moments_seconds;  /* sums for the gradient */
+    double host_seconds;     /* parameter updates and the chain rule */
+    uint64_t list_builds;
+    uint64_t field_passes;
+    uint64_t moments_passes;
+    uint64_t launches;       /* kernels enqueued */
+} ovoid_fit_profile;
+
+typedef struct ovoid_fit_result {
+    uint64_t points;      /* constrained points */
+    uint64_t ellipsoids;
+    uint64_t iterations;  /* done */
+    double rms_error;     /* sqrt(E_s / points) */
+    double max_error;     /* max_k |phi~ - phi| over the constrained points */
+    double sample_seconds;
+    double fit_seconds;
+    ovoid_fit_profile profile;
+} ovoid_fit_result;
+
+/* Fills in the defaults. */
+OVOID_API void ovoid_fit_options_init(ovoid_fit_options *options);
+
+/* Fits a model to a molecule's surface on the opened device (opening the default one if none is).
+ * The same input, options, device and driver give the same bits. result may be NULL. */
+OVOID_API ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
+                                 const ovoid_fit_options *options, ovoid_model **model,
+                                 ovoid_fit_result *result);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

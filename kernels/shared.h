@@ -1,0 +1,45 @@
+/*
+ * What the host and the kernels share: sizes and structures. Fixed-width scalars only, explicit
+ * padding, sizes and offsets asserted by the host and reported by kernels/layout.cl.
+ */
+#ifndef OV_SHARED_H
+#define OV_SHARED_H
+
+#ifdef __OPENCL_C_VERSION__
+typedef uint ov_u32;
+typedef float ov_f32;
+#else
+#include <stdint.h>
+typedef uint32_t ov_u32;
+typedef float ov_f32;
+#endif
+
+/* Points in a pack: one warp on a GPU, two float16 on a CPU. */
+#define OV_PACK 32
+/* Boxes in a group of the tree over packs or terms, and levels of that tree (16^7 leaves). */
+#define OV_GROUP 16
+#define OV_LEVELS 7
+/* Monomials of degree up to 2 in z = y - centre: 1, x, y, z, xx, xy, xz, yy, yz, zz. */
+#define OV_MONOMIALS 10
+
+/* One ellipsoid as the kernels see it: 2^(log2_amplitude - q(z)), q(z) = z^T A z with A already
+ * multiplied by log2(e). Coordinates are relative to the points' origin, in angstrom. */
+typedef struct ov_term {
+    ov_f32 log2_amplitude;
+    ov_f32 x, y, z;                /* centre */
+    ov_f32 xx, xy, xz, yy, yz, zz; /* A; the off-diagonal entries are doubled: q = xx x^2 + xy x y + ... */
+    ov_f32 reach;                  /* largest q within the cut-off; negative: reaches nothing */
+    ov_f32 padding;
+} ov_term;
+
+/* A tree of boxes over consecutive leaves: level 0 holds the leaves, each level above one box per
+ * group of OV_GROUP below. Boxes are stored by group as OV_GROUP values each of low x, low y, low z,
+ * high x, high y, high z; absent boxes are empty (low > high). */
+typedef struct ov_tree {
+    ov_u32 levels;
+    ov_u32 boxes[OV_LEVELS];  /* number of boxes of a level */
+    ov_u32 groups[OV_LEVELS]; /* index of a level's first group */
+    ov_u32 padding;
+} ov_tree;
+
+#endif

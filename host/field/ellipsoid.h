@@ -1,0 +1,30 @@
+/*
+ * One ellipsoid on the host, in double: the paper's parameters, the quadratic form, and back.
+ */
+#ifndef OV_ELLIPSOID_H
+#define OV_ELLIPSOID_H
+
+#include "ovoid/ovoid.h"
+
+/* amplitude * exp(-(x - centre)^T A (x - centre)); a = A's xx, xy, xz, yy, yz, zz (angstrom^-2). */
+typedef struct ov_quadric {
+    double amplitude;
+    double centre[3];
+    double a[6];
+} ov_quadric;
+
+/* R = R_z(angle[2]) R_y(angle[1]) R_x(angle[0]) with the paper's signs (eq. 2.11). */
+void ov_rotation(const double angle[3], double r[3][3]);
+
+/* Derivatives of R with respect to the three angles. */
+void ov_rotation_derivatives(const double angle[3], double dr[3][3][3]);
+
+/* A = R^T diag(decay) R, as xx, xy, xz, yy, yz, zz. */
+void ov_quadratic_form(double r[3][3], const double decay[3], double a[6]);
+
+void ov_quadric_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_quadric *quadric);
+
+/* The Gaussian of an atom: exp(-d (|x - x_i|^2 - r^2)); xyzr in angstrom, d in angstrom^-2. */
+void ov_quadric_of_atom(const double xyzr[4], double d, ov_quadric *quadric);
+
+#endif

@@ -1,0 +1,156 @@
+/*
+ * Points in packs, terms, the lists that pair them, and the operations over them on the device
+ * (design, section 4). Everything here is linear in points and terms.
+ *
+ * Use: points once, terms whenever the parameters change, lists when terms have moved further than
+ * the lists' skin, then the operations. Structures start as {0}; destroy functions accept that.
+ */
+#ifndef OV_FIELD_H
+#define OV_FIELD_H
+
+#include "device/device.h"
+#include "field/ellipsoid.h"
+#include "shared.h"
+
+/* ---- points ------------------------------------------------------------------------------- */
+
+typedef struct ov_points {
+    size_t count;
+    size_t packs;     /* ceil(count / OV_PACK); the last one is filled up with its last point */
+    double origin[3]; /* angstrom, subtracted before rounding to float */
+    uint32_t *order;  /* point k of the packs is point order[k] of the caller, count entries */
+    ov_tree tree;     /* of boxes over the packs */
+    ov_buffer xyz;    /* device: per pack OV_PACK x, y, z */
+    ov_buffer boxes;  /* device: the tree's boxes */
+} ov_points;
+
+/* Sorts `count` points along a space-filling curve, cuts them into packs, uploads. xyz: 3 * count
+ * floats, relative to origin (angstrom); resolution: size of the curve's cells, angstrom. */
+ovoid_status ov_points_create(ovoid_context *context, const float *xyz, size_t count,
+                              const double origin[3], double resolution, ov_points *points);
+void ov_points_destroy(ov_points *points);
+
+/* Uploads points that are in packs already: count and packs are set, packed holds OV_PACK x, y, z
+ * per pack, leaves each pack's box (low x, y, z, high x, y, z). */
+ovoid_status ov_points_upload(ovoid_context *context, const float *packed, const float *leaves,
+                              ov_points *points);
+
+/* Index of cell (x, y, z), `bits` bits each (1 to 21), along the Hilbert curve. */
+uint64_t ov_hilbert_index(uint32_t x, uint32_t y, uint32_t z, unsigned bits);
+
+/* order[k] = index of the k-th smallest key; equal keys keep their order. */
+ovoid_status ov_sort_keys(ovoid_context *context, const uint64_t *keys, size_t count,
+                          uint32_t *order);
+
+/* Builds the tree over leaf boxes given as low x, y, z, high x, y, z (6 * leaves floats). *boxes is
+ * allocated (free with free()) in the layout of ov_tree, *floats long. */
+ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t count, ov_tree *tree,
+                           float **boxes, size_t *floats);
+
+/* ---- terms -------------------------------------------------------------------------------- */
+
+typedef struct ov_terms {
+    size_t count;
+    ov_term *host; /* what was uploaded */
+    size_t capacity;
+    ov_buffer device;
+} ov_terms;
+
+/* Converts and uploads. cutoff: a term counts where its value is at least this. A term of amplitude
+ * at most `cutoff` reaches nothing. OVOID_ERROR_NUMERIC when a value is not finite or A is not
+ * positive definite. */
+ovoid_status ov_terms_set(ovoid_context *context, ov_terms *terms, const ov_quadric *quadrics,
+                          size_t count, const double origin[3], double cutoff);
+void ov_terms_destroy(ov_terms *terms);
+
+/* ---- lists -------------------------------------------------------------------------------- */
+
+typedef struct ov_lists {
+    size_t terms, packs;
+    size_t items;         /* term-pack pairs; each list holds this many entries */
+    ov_buffer term_start; /* terms + 1 */
+    ov_buffer term_item;  /* packs of each term, ascending */
+    ov_buffer pack_start; /* packs + 1 */
+    ov_buffer pack_item;  /* terms of each pack, ascending */
+    ov_buffer count;      /* scratch */
+    uint32_t *scan;       /* scratch */
+    size_t scan_capacity;
+    ov_kernel packs_of_terms, count_transposed, fill_transposed, sort_lists;
+} ov_lists;
+
+/* Pairs terms with the packs that they reach, boxes grown by skin (angstrom). OVOID_ERROR_LIMIT
+ * when there are more pairs than 2^32 - 1 or than a buffer of the device holds. */
+ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                            const ov_terms *terms, double skin);
+void ov_lists_destroy(ov_lists *lists);
+
+/* ---- operations --------------------------------------------------------------------------- */
+
+typedef struct ov_operations {
+    ov_kernel field, field_polynomial, field_gradient, moments, residual;
+} ov_operations;
+
+/* Kernels are made on first use. */
+void ov_operations_destroy(ov_operations *operations);
+
+/* value[k] = sum_i e_i(y_k): packs * OV_PACK floats on the device. */
+ovoid_status ov_field(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                      const ov_terms *terms, const ov_lists *lists, ov_buffer *value);
+
+/* value[k] = sum_i e_i(y_k) p_i(y_k - mu_i); polynomial: OV_MONOMIALS floats per term, on the
+ * device. */
+ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operations,
+                                 const ov_points *points, const ov_terms *terms,
+                                 const ov_lists *lists, const ov_buffer *polynomial,
+                                 ov_buffer *value);
+
+/* As ov_field(), with the gradient: OV_PACK x, y, z components per pack (angstrom^-1). */
+ovoid_status ov_field_gradient(ovoid_context *context, ov_operations *operations,
+                               const ov_points *points, const ov_terms *terms,
+                               const ov_lists *lists, ov_buffer *value, ov_buffer *gradient);
+
+/* result: OV_MONOMIALS (high, low) pairs of floats per term, sum_k u_k e_i(y_k) m(y_k - mu_i). */
+ovoid_status ov_moments(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                        const ov_terms *terms, const ov_lists *lists, const ov_buffer *u,
+                        ov_buffer *result);
+
+/* u = value - target at the points, 0 at the fill; sums: per pack sum of u^2 and largest |u|. */
+ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                         const ov_buffer *value, const ov_buffer *target, ov_buffer *u,
+                         ov_buffer *sums);
+
+/* ---- constrained points ------------------------------------------------------------------- */
+
+/* Cut-off of the target field, well under its float rounding. */
+#define OV_TARGET_CUTOFF 1e-7
+
+/* The lattice of section 3.2.2: x_i = a + i (b - a) / N_x with i = 1 .. N_x, on the box of the atom
+ * centres grown by padding; N_x = ceil((b - a) / spacing). */
+typedef struct ov_lattice {
+    double low[3];
+    double step[3];
+    uint64_t size[3];
+} ov_lattice;
+
+ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_t atoms,
+                               double spacing, double padding, ov_lattice *lattice);
+
+/* Which lattice points are kept: phi within [low, high]. */
+typedef struct ov_band {
+    double low, high;
+} ov_band;
+
+/* The constrained points with phi and its gradient, on the device. */
+typedef struct ov_samples {
+    ov_points points;
+    ov_buffer value;    /* phi, as ov_field() stores it */
+    ov_buffer gradient; /* its gradient, as ov_field_gradient() stores it */
+} ov_samples;
+
+/* Evaluates phi on the lattice piece by piece and keeps the band. OVOID_ERROR_EMPTY when no lattice
+ * point lies in it. */
+ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                       const ov_lattice *lattice, ov_band band, ov_samples *samples);
+void ov_samples_destroy(ov_samples *samples);
+
+#endif

@@ -1,0 +1,121 @@
+#include "field/field.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static ovoid_status prepare(ovoid_context *context, ov_lists *lists) {
+    ovoid_status status = OVOID_OK;
+    if (lists->packs_of_terms.handle)
+        return OVOID_OK;
+    OV_TRY(ov_kernel_create(context, "lists", "count_transposed", &lists->count_transposed));
+    OV_TRY(ov_kernel_create(context, "lists", "fill_transposed", &lists->fill_transposed));
+    OV_TRY(ov_kernel_create(context, "lists", "sort_lists", &lists->sort_lists));
+    OV_TRY(ov_kernel_create(context, "lists", "packs_of_terms", &lists->packs_of_terms));
+cleanup:
+    return status;
+}
+
+/* Turns the counts on the device into starts (count + 1 of them) in `start`; *total is their sum.
+ */
+static ovoid_status scan_counts(ovoid_context *context, ov_lists *lists, size_t count,
+                                ov_buffer *start, size_t *total) {
+    ovoid_status status = ov_grow(context, &lists->scan, &lists->scan_capacity, count + 1,
+                                  sizeof *lists->scan, "lists");
+    if (status != OVOID_OK)
+        return status;
+    uint32_t *const scan = lists->scan;
+    OV_TRY(ov_buffer_read(context, &lists->count, 0, scan, count * sizeof *scan));
+    uint64_t sum = 0;
+    for (size_t k = 0; k < count; ++k) {
+        const uint32_t own = scan[k];
+        scan[k] = (uint32_t)sum;
+        sum += own;
+        if (sum > UINT32_MAX) {
+            status = ov_fail(context, OVOID_ERROR_LIMIT,
+                             "more than 2^32 pairs of ellipsoids and packs of points; use a larger "
+                             "spacing");
+            goto cleanup;
+        }
+    }
+    scan[count] = (uint32_t)sum;
+    OV_TRY(ov_buffer_reserve(context, start, (count + 1) * sizeof *scan, "starts of lists"));
+    OV_TRY(ov_buffer_write(context, start, 0, scan, (count + 1) * sizeof *scan));
+    *total = (size_t)sum;
+cleanup:
+    return status;
+}
+
+static ovoid_status list_packs(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                               const ov_terms *terms, double skin) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint count = (cl_uint)terms->count;
+    const cl_float grow = (cl_float)skin;
+    const size_t bytes =
+        (terms->count > points->packs ? terms->count : points->packs) * sizeof(cl_uint);
+    OV_TRY(ov_buffer_reserve(context, &lists->count, bytes, "counts of lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->term_start, bytes, "starts of lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->term_item, sizeof(cl_uint), "packs of ellipsoids"));
+    for (cl_uint fill = 0; fill <= 1; ++fill) {
+        OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, terms->count, 0, OV_ARG(count),
+                         OV_ARG(terms->device.memory), OV_ARG(points->tree),
+                         OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(fill),
+                         OV_ARG(lists->count.memory), OV_ARG(lists->term_start.memory),
+                         OV_ARG(lists->term_item.memory)));
+        if (fill == 0) {
+            OV_TRY(scan_counts(context, lists, terms->count, &lists->term_start, &lists->items));
+            OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * sizeof(cl_uint),
+                                     "packs of ellipsoids"));
+        }
+    }
+cleanup:
+    return status;
+}
+
+static ovoid_status transpose(ovoid_context *context, ov_lists *lists, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint terms = (cl_uint)lists->terms, lists_count = (cl_uint)packs;
+    size_t total = 0;
+    OV_TRY(ov_grow(context, &lists->scan, &lists->scan_capacity, packs + 1, sizeof *lists->scan,
+                   "lists"));
+    memset(lists->scan, 0, packs * sizeof *lists->scan);
+    OV_TRY(ov_buffer_write(context, &lists->count, 0, lists->scan, packs * sizeof *lists->scan));
+    OV_TRY(OV_LAUNCH(context, &lists->count_transposed, lists->terms, 0, OV_ARG(terms),
+                     OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
+                     OV_ARG(lists->count.memory)));
+    OV_TRY(scan_counts(context, lists, packs, &lists->pack_start, &total));
+    OV_TRY(ov_buffer_write(context, &lists->count, 0, lists->scan, packs * sizeof *lists->scan));
+    OV_TRY(ov_buffer_reserve(context, &lists->pack_item, total * sizeof(cl_uint),
+                             "ellipsoids of packs"));
+    OV_TRY(OV_LAUNCH(context, &lists->fill_transposed, lists->terms, 0, OV_ARG(terms),
+                     OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
+                     OV_ARG(lists->count.memory), OV_ARG(lists->pack_item.memory)));
+    OV_TRY(OV_LAUNCH(context, &lists->sort_lists, packs, 0, OV_ARG(lists_count),
+                     OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory)));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                            const ov_terms *terms, double skin) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(prepare(context, lists));
+    lists->terms = terms->count;
+    lists->packs = points->packs;
+    OV_TRY(list_packs(context, lists, points, terms, skin));
+    OV_TRY(transpose(context, lists, points->packs));
+cleanup:
+    return status;
+}
+
+void ov_lists_destroy(ov_lists *lists) {
+    ov_buffer *const buffers[] = {&lists->term_start, &lists->term_item, &lists->pack_start,
+                                  &lists->pack_item, &lists->count};
+    for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
+        ov_buffer_destroy(buffers[k]);
+    ov_kernel_destroy(&lists->packs_of_terms);
+    ov_kernel_destroy(&lists->count_transposed);
+    ov_kernel_destroy(&lists->fill_transposed);
+    ov_kernel_destroy(&lists->sort_lists);
+    free(lists->scan);
+    memset(lists, 0, sizeof *lists);
+}

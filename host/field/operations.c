@@ -1,0 +1,114 @@
+#include "field/field.h"
+
+#include <string.h>
+
+static ovoid_status make(ovoid_context *context, ov_kernel *kernel, const char *program,
+                         const char *name) {
+    return kernel->handle ? OVOID_OK : ov_kernel_create(context, program, name, kernel);
+}
+
+void ov_operations_destroy(ov_operations *operations) {
+    ov_kernel_destroy(&operations->field);
+    ov_kernel_destroy(&operations->field_polynomial);
+    ov_kernel_destroy(&operations->field_gradient);
+    ov_kernel_destroy(&operations->moments);
+    ov_kernel_destroy(&operations->residual);
+}
+
+/* `groups` packs or terms, each handled by the shape's lanes as one work-group. */
+static ovoid_status launch_lanes(ovoid_context *context, const ov_kernel *kernel, size_t groups,
+                                 const ov_arg *args, size_t arg_count) {
+    ov_device *device;
+    const ovoid_status status = ov_device_get(context, &device);
+    if (status != OVOID_OK)
+        return status;
+    const size_t lanes = device->shape.lanes;
+    return ov_launch(context, kernel, groups * lanes, lanes, args, arg_count);
+}
+#define LAUNCH_LANES(context, kernel, groups, ...)                                                 \
+    launch_lanes((context), (kernel), (groups), (const ov_arg[]){__VA_ARGS__},                     \
+                 sizeof((const ov_arg[]){__VA_ARGS__}) / sizeof(ov_arg))
+
+static ovoid_status reserve_values(ovoid_context *context, const ov_points *points,
+                                   ov_buffer *value) {
+    return ov_buffer_reserve(context, value, points->packs * OV_PACK * sizeof(cl_float),
+                             "values at points");
+}
+
+ovoid_status ov_field(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                      const ov_terms *terms, const ov_lists *lists, ov_buffer *value) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint packs = (cl_uint)points->packs;
+    OV_TRY(make(context, &operations->field, "field", "field"));
+    OV_TRY(reserve_values(context, points, value));
+    OV_TRY(LAUNCH_LANES(context, &operations->field, points->packs, OV_ARG(packs),
+                        OV_ARG(points->xyz.memory), OV_ARG(lists->pack_start.memory),
+                        OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
+                        OV_ARG(value->memory)));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operations,
+                                 const ov_points *points, const ov_terms *terms,
+                                 const ov_lists *lists, const ov_buffer *polynomial,
+                                 ov_buffer *value) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint packs = (cl_uint)points->packs;
+    OV_TRY(make(context, &operations->field_polynomial, "field", "field_polynomial"));
+    OV_TRY(reserve_values(context, points, value));
+    OV_TRY(LAUNCH_LANES(context, &operations->field_polynomial, points->packs, OV_ARG(packs),
+                        OV_ARG(points->xyz.memory), OV_ARG(lists->pack_start.memory),
+                        OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
+                        OV_ARG(polynomial->memory), OV_ARG(value->memory)));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_field_gradient(ovoid_context *context, ov_operations *operations,
+                               const ov_points *points, const ov_terms *terms,
+                               const ov_lists *lists, ov_buffer *value, ov_buffer *gradient) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint packs = (cl_uint)points->packs;
+    OV_TRY(make(context, &operations->field_gradient, "field", "field_gradient"));
+    OV_TRY(reserve_values(context, points, value));
+    OV_TRY(ov_buffer_reserve(context, gradient, points->packs * 3 * OV_PACK * sizeof(cl_float),
+                             "gradients at points"));
+    OV_TRY(LAUNCH_LANES(context, &operations->field_gradient, points->packs, OV_ARG(packs),
+                        OV_ARG(points->xyz.memory), OV_ARG(lists->pack_start.memory),
+                        OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
+                        OV_ARG(value->memory), OV_ARG(gradient->memory)));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_moments(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                        const ov_terms *terms, const ov_lists *lists, const ov_buffer *u,
+                        ov_buffer *result) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint count = (cl_uint)terms->count;
+    OV_TRY(make(context, &operations->moments, "moments", "moments"));
+    OV_TRY(ov_buffer_reserve(context, result, terms->count * 2 * OV_MONOMIALS * sizeof(cl_float),
+                             "moments"));
+    OV_TRY(LAUNCH_LANES(context, &operations->moments, terms->count, OV_ARG(count),
+                        OV_ARG(points->xyz.memory), OV_ARG(u->memory),
+                        OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
+                        OV_ARG(terms->device.memory), OV_ARG(result->memory)));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                         const ov_buffer *value, const ov_buffer *target, ov_buffer *u,
+                         ov_buffer *sums) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint packs = (cl_uint)points->packs, count = (cl_uint)points->count;
+    OV_TRY(make(context, &operations->residual, "residual", "residual"));
+    OV_TRY(reserve_values(context, points, u));
+    OV_TRY(ov_buffer_reserve(context, sums, points->packs * 2 * sizeof(cl_float), "pack sums"));
+    OV_TRY(OV_LAUNCH(context, &operations->residual, points->packs, 0, OV_ARG(packs), OV_ARG(count),
+                     OV_ARG(value->memory), OV_ARG(target->memory), OV_ARG(u->memory),
+                     OV_ARG(sums->memory)));
+cleanup:
+    return status;
+}

@@ -1,0 +1,323 @@
+#include "field/field.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A brick of lattice points is one pack. */
+#define BRICK_X 4
+#define BRICK_Y 4
+#define BRICK_Z 2
+_Static_assert(BRICK_X *BRICK_Y *BRICK_Z == OV_PACK, "a brick is a pack");
+
+/* Largest piece of the lattice that is evaluated at once: a million points, 16 MB on the device. */
+static const uint64_t piece_limit[3] = {128, 128, 64};
+static const uint64_t brick[3] = {BRICK_X, BRICK_Y, BRICK_Z};
+
+/* The lattice cut into equal pieces of whole bricks; the last pieces may reach past its end. */
+typedef struct piece_grid {
+    uint64_t size[3];  /* lattice points of a piece */
+    uint64_t count[3]; /* pieces per axis */
+    uint64_t total;
+    size_t *start; /* atoms of piece p: atom[start[p]] .. atom[start[p + 1] - 1] */
+    uint32_t *atom;
+} piece_grid;
+
+typedef struct sampler {
+    const double *xyzr;
+    size_t atoms;
+    double decay;
+    const ov_lattice *lattice;
+    ov_band band;
+    double origin[3]; /* of the kept points */
+    piece_grid pieces;
+    ov_points points; /* of one piece, relative to its corner */
+    ov_terms terms;
+    ov_lists lists;
+    ov_operations operations;
+    ov_buffer value;
+    float *values;        /* of one piece */
+    ov_quadric *quadrics; /* of one piece's atoms */
+    size_t quadrics_capacity;
+    float *kept;                      /* x, y, z relative to origin */
+    size_t kept_count, kept_capacity; /* capacity in floats */
+} sampler;
+
+ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_t atoms,
+                               double spacing, double padding, ov_lattice *lattice) {
+    double total = 1.0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        double low = xyzr[axis], high = xyzr[axis];
+        for (size_t i = 1; i < atoms; ++i) {
+            low = fmin(low, xyzr[4 * i + axis]);
+            high = fmax(high, xyzr[4 * i + axis]);
+        }
+        low -= padding;
+        high += padding;
+        const double steps = fmax(1.0, ceil((high - low) / spacing - 1e-9));
+        total *= steps;
+        if (!(total < 1e12))
+            return ov_fail(context, OVOID_ERROR_LIMIT,
+                           "the lattice of constrained points would have more than 1e12 points "
+                           "(spacing %g angstrom)",
+                           spacing);
+        lattice->low[axis] = low;
+        lattice->size[axis] = (uint64_t)steps;
+        lattice->step[axis] = (high - low) / steps;
+    }
+    return OVOID_OK;
+}
+
+/* Coordinate of lattice index i = 0 .. size - 1; the paper counts from 1. */
+static double coordinate(const ov_lattice *lattice, size_t axis, uint64_t i) {
+    return lattice->low[axis] + (double)(i + 1) * lattice->step[axis];
+}
+
+static void plan_pieces(const ov_lattice *lattice, piece_grid *pieces) {
+    pieces->total = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        const uint64_t size = lattice->size[axis];
+        const uint64_t count = (size + piece_limit[axis] - 1) / piece_limit[axis];
+        const uint64_t bricks = (size + count * brick[axis] - 1) / (count * brick[axis]);
+        pieces->size[axis] = bricks * brick[axis];
+        pieces->count[axis] = (size + pieces->size[axis] - 1) / pieces->size[axis];
+        pieces->total *= pieces->count[axis];
+    }
+}
+
+/* Range of pieces along one axis that an atom of this reach touches; empty if first > last. */
+static void piece_range(const sampler *s, size_t axis, double centre, double reach, int64_t *first,
+                        int64_t *last) {
+    const ov_lattice *const lattice = s->lattice;
+    const double width = lattice->step[axis] * (double)s->pieces.size[axis];
+    const double from = coordinate(lattice, axis, 0);
+    *first = (int64_t)fmax(0.0, floor((centre - reach - from) / width - 1e-6));
+    *last = (int64_t)fmin((double)s->pieces.count[axis] - 1.0,
+                          floor((centre + reach - from) / width + 1e-6));
+}
+
+/* Calls back for each piece that the atom reaches: counts it, or stores the atom. */
+static void visit_pieces(sampler *s, uint32_t atom, bool store, size_t *cursor) {
+    const double *const a = s->xyzr + 4 * (size_t)atom;
+    const double reach = sqrt(a[3] * a[3] - log(OV_TARGET_CUTOFF) / s->decay);
+    int64_t first[3], last[3];
+    for (size_t axis = 0; axis < 3; ++axis)
+        piece_range(s, axis, a[axis], reach, &first[axis], &last[axis]);
+    for (int64_t z = first[2]; z <= last[2]; ++z)
+        for (int64_t y = first[1]; y <= last[1]; ++y)
+            for (int64_t x = first[0]; x <= last[0]; ++x) {
+                const uint64_t piece =
+                    ((uint64_t)z * s->pieces.count[1] + (uint64_t)y) * s->pieces.count[0] +
+                    (uint64_t)x;
+                if (store)
+                    s->pieces.atom[cursor[piece]++] = atom;
+                else
+                    ++s->pieces.start[piece + 1];
+            }
+}
+
+/* Sorts the atoms into the pieces that they reach. */
+static ovoid_status bin_atoms(ovoid_context *context, sampler *s) {
+    piece_grid *const pieces = &s->pieces;
+    size_t *cursor = NULL;
+    pieces->start = ov_alloc(context, pieces->total + 1, sizeof *pieces->start, "lattice pieces");
+    cursor = ov_alloc(context, pieces->total, sizeof *cursor, "lattice pieces");
+    if (!pieces->start || !cursor)
+        goto fail;
+    for (uint32_t i = 0; i < s->atoms; ++i)
+        visit_pieces(s, i, false, NULL);
+    for (uint64_t p = 0; p < pieces->total; ++p) {
+        cursor[p] = pieces->start[p];
+        pieces->start[p + 1] += pieces->start[p];
+    }
+    pieces->atom =
+        ov_alloc(context, pieces->start[pieces->total], sizeof *pieces->atom, "atoms of pieces");
+    if (!pieces->atom)
+        goto fail;
+    for (uint32_t i = 0; i < s->atoms; ++i)
+        visit_pieces(s, i, true, cursor);
+    free(cursor);
+    return OVOID_OK;
+fail:
+    free(cursor);
+    return OVOID_ERROR_MEMORY;
+}
+
+/* Fills one brick's packed coordinates and box; at: index of its first point within the piece. */
+static void lay_brick(const ov_lattice *lattice, const uint64_t at[3], float *packed, float *box) {
+    for (uint64_t j = 0; j < OV_PACK; ++j) {
+        const uint64_t within[3] = {j % BRICK_X, j / BRICK_X % BRICK_Y, j / (BRICK_X * BRICK_Y)};
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const float x = (float)((double)(at[axis] + within[axis]) * lattice->step[axis]);
+            packed[axis * OV_PACK + j] = x;
+            if (j == 0)
+                box[axis] = x;
+            if (j == OV_PACK - 1)
+                box[axis + 3] = x;
+        }
+    }
+}
+
+/* The bricks of a piece, in raster order; the same for all pieces since each has its own origin. */
+static ovoid_status lay_piece(ovoid_context *context, sampler *s) {
+    ovoid_status status = OVOID_OK;
+    const uint64_t *const size = s->pieces.size;
+    const size_t packs = (size_t)(size[0] * size[1] * size[2] / OV_PACK);
+    float *const packed = ov_alloc(context, packs * 3 * OV_PACK, sizeof *packed, "lattice points");
+    float *const boxes = ov_alloc(context, packs * 6, sizeof *boxes, "lattice bricks");
+    s->values = ov_alloc(context, packs * OV_PACK, sizeof *s->values, "lattice values");
+    if (!packed || !boxes || !s->values) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    size_t pack = 0;
+    for (uint64_t z = 0; z < size[2]; z += BRICK_Z)
+        for (uint64_t y = 0; y < size[1]; y += BRICK_Y)
+            for (uint64_t x = 0; x < size[0]; x += BRICK_X, ++pack)
+                lay_brick(s->lattice, (const uint64_t[3]){x, y, z}, packed + pack * (3 * OV_PACK),
+                          boxes + pack * 6);
+    s->points.count = packs * OV_PACK;
+    s->points.packs = packs;
+    OV_TRY(ov_points_upload(context, packed, boxes, &s->points));
+cleanup:
+    free(packed);
+    free(boxes);
+    return status;
+}
+
+/* phi at the points of one piece, into s->values. */
+static ovoid_status evaluate_piece(ovoid_context *context, sampler *s, uint64_t piece,
+                                   const uint64_t at[3]) {
+    ovoid_status status = OVOID_OK;
+    const size_t first = s->pieces.start[piece], count = s->pieces.start[piece + 1] - first;
+    const size_t bytes = s->points.packs * OV_PACK * sizeof *s->values;
+    if (count == 0) {
+        memset(s->values, 0, bytes);
+        return OVOID_OK;
+    }
+    OV_TRY(ov_grow(context, &s->quadrics, &s->quadrics_capacity, count, sizeof *s->quadrics,
+                   "atoms of a lattice piece"));
+    for (size_t k = 0; k < count; ++k)
+        ov_quadric_of_atom(s->xyzr + 4 * (size_t)s->pieces.atom[first + k], s->decay,
+                           &s->quadrics[k]);
+    double corner[3];
+    for (size_t axis = 0; axis < 3; ++axis)
+        corner[axis] = coordinate(s->lattice, axis, at[axis]);
+    OV_TRY(ov_terms_set(context, &s->terms, s->quadrics, count, corner, OV_TARGET_CUTOFF));
+    OV_TRY(ov_lists_build(context, &s->lists, &s->points, &s->terms, 0.0));
+    OV_TRY(ov_field(context, &s->operations, &s->points, &s->terms, &s->lists, &s->value));
+    OV_TRY(ov_buffer_read(context, &s->value, 0, s->values, bytes));
+cleanup:
+    return status;
+}
+
+/* Appends the piece's points that lie on the lattice and in the band. */
+static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t at[3]) {
+    const uint64_t *const size = s->pieces.size;
+    const uint64_t row = size[0] / BRICK_X, rows = size[1] / BRICK_Y;
+    const ovoid_status status =
+        ov_grow(context, &s->kept, &s->kept_capacity, 3 * (s->kept_count + s->points.count),
+                sizeof *s->kept, "constrained points");
+    if (status != OVOID_OK)
+        return status;
+    for (size_t k = 0; k < s->points.count; ++k) {
+        if (!(s->values[k] >= s->band.low && s->values[k] <= s->band.high))
+            continue;
+        const uint64_t pack = k / OV_PACK, j = k % OV_PACK;
+        const uint64_t index[3] = {
+            at[0] + pack % row * BRICK_X + j % BRICK_X,
+            at[1] + pack / row % rows * BRICK_Y + j / BRICK_X % BRICK_Y,
+            at[2] + pack / (row * rows) * BRICK_Z + j / (BRICK_X * BRICK_Y),
+        };
+        if (index[0] >= s->lattice->size[0] || index[1] >= s->lattice->size[1] ||
+            index[2] >= s->lattice->size[2])
+            continue;
+        for (size_t axis = 0; axis < 3; ++axis)
+            s->kept[3 * s->kept_count + axis] =
+                (float)(coordinate(s->lattice, axis, index[axis]) - s->origin[axis]);
+        ++s->kept_count;
+    }
+    return OVOID_OK;
+}
+
+static ovoid_status sample_pieces(ovoid_context *context, sampler *s) {
+    ovoid_status status = OVOID_OK;
+    uint64_t piece = 0;
+    for (uint64_t z = 0; z < s->pieces.count[2]; ++z)
+        for (uint64_t y = 0; y < s->pieces.count[1]; ++y)
+            for (uint64_t x = 0; x < s->pieces.count[0]; ++x, ++piece) {
+                const uint64_t at[3] = {x * s->pieces.size[0], y * s->pieces.size[1],
+                                        z * s->pieces.size[2]};
+                if (s->pieces.start[piece] == s->pieces.start[piece + 1] && s->band.low > 0.0)
+                    continue; /* far outside, and the band has no such points */
+                OV_TRY(evaluate_piece(context, s, piece, at));
+                OV_TRY(keep_band(context, s, at));
+            }
+    if (s->kept_count == 0)
+        status = ov_fail(context, OVOID_ERROR_EMPTY,
+                         "no lattice point has a field between %g and %g; use a smaller spacing or "
+                         "a larger padding",
+                         s->band.low, s->band.high);
+cleanup:
+    return status;
+}
+
+/* phi and its gradient once more at the kept points, with the rounding that a fit will see. */
+static ovoid_status finish_samples(ovoid_context *context, sampler *s, ov_samples *samples) {
+    ovoid_status status = OVOID_OK;
+    const double *const step = s->lattice->step;
+    OV_TRY(ov_points_create(context, s->kept, s->kept_count, s->origin,
+                            fmax(step[0], fmax(step[1], step[2])), &samples->points));
+    OV_TRY(ov_grow(context, &s->quadrics, &s->quadrics_capacity, s->atoms, sizeof *s->quadrics,
+                   "atoms"));
+    for (size_t i = 0; i < s->atoms; ++i)
+        ov_quadric_of_atom(s->xyzr + 4 * i, s->decay, &s->quadrics[i]);
+    OV_TRY(ov_terms_set(context, &s->terms, s->quadrics, s->atoms, s->origin, OV_TARGET_CUTOFF));
+    OV_TRY(ov_lists_build(context, &s->lists, &samples->points, &s->terms, 0.0));
+    OV_TRY(ov_field_gradient(context, &s->operations, &samples->points, &s->terms, &s->lists,
+                             &samples->value, &samples->gradient));
+    OV_TRY(ov_finish(context));
+cleanup:
+    return status;
+}
+
+static void destroy_sampler(sampler *s) {
+    free(s->pieces.start);
+    free(s->pieces.atom);
+    free(s->values);
+    free(s->quadrics);
+    free(s->kept);
+    ov_points_destroy(&s->points);
+    ov_terms_destroy(&s->terms);
+    ov_lists_destroy(&s->lists);
+    ov_operations_destroy(&s->operations);
+    ov_buffer_destroy(&s->value);
+}
+
+ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                       const ov_lattice *lattice, ov_band band, ov_samples *samples) {
+    ovoid_status status = OVOID_OK;
+    ov_samples made = {0};
+    sampler s = {.xyzr = xyzr, .atoms = atoms, .decay = decay, .lattice = lattice, .band = band};
+    for (size_t axis = 0; axis < 3; ++axis)
+        s.origin[axis] =
+            lattice->low[axis] + 0.5 * lattice->step[axis] * (double)lattice->size[axis];
+    plan_pieces(lattice, &s.pieces);
+    OV_TRY(bin_atoms(context, &s));
+    OV_TRY(lay_piece(context, &s));
+    OV_TRY(sample_pieces(context, &s));
+    OV_TRY(finish_samples(context, &s, &made));
+cleanup:
+    destroy_sampler(&s);
+    if (status == OVOID_OK)
+        *samples = made;
+    else
+        ov_samples_destroy(&made);
+    return status;
+}
+
+void ov_samples_destroy(ov_samples *samples) {
+    ov_points_destroy(&samples->points);
+    ov_buffer_destroy(&samples->value);
+    ov_buffer_destroy(&samples->gradient);
+}

@@ -1,0 +1,65 @@
+#include "field/field.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LOG2_E 1.4426950408889634
+
+static bool is_positive_definite(const double a[6]) {
+    const double minor = a[0] * a[3] - a[1] * a[1];
+    const double determinant = a[0] * (a[3] * a[5] - a[4] * a[4]) -
+                               a[1] * (a[1] * a[5] - a[4] * a[2]) +
+                               a[2] * (a[1] * a[4] - a[3] * a[2]);
+    return a[0] > 0.0 && minor > 0.0 && determinant > 0.0;
+}
+
+/* q's off-diagonal coefficients are doubled here, once, instead of per pair in the kernels. */
+static bool to_term(const ov_quadric *quadric, const double origin[3], double log2_cutoff,
+                    ov_term *term) {
+    const double log2_amplitude = log2(quadric->amplitude);
+    *term = (ov_term){
+        .log2_amplitude = (float)log2_amplitude,
+        .x = (float)(quadric->centre[0] - origin[0]),
+        .y = (float)(quadric->centre[1] - origin[1]),
+        .z = (float)(quadric->centre[2] - origin[2]),
+        .xx = (float)(LOG2_E * quadric->a[0]),
+        .xy = (float)(2.0 * LOG2_E * quadric->a[1]),
+        .xz = (float)(2.0 * LOG2_E * quadric->a[2]),
+        .yy = (float)(LOG2_E * quadric->a[3]),
+        .yz = (float)(2.0 * LOG2_E * quadric->a[4]),
+        .zz = (float)(LOG2_E * quadric->a[5]),
+        .reach = (float)(log2_amplitude - log2_cutoff),
+    };
+    const float sum = term->x + term->y + term->z + term->xx + term->xy + term->xz + term->yy +
+                      term->yz + term->zz;
+    return isfinite(sum) && isfinite(log2_amplitude) && is_positive_definite(quadric->a);
+}
+
+ovoid_status ov_terms_set(ovoid_context *context, ov_terms *terms, const ov_quadric *quadrics,
+                          size_t count, const double origin[3], double cutoff) {
+    ovoid_status status =
+        ov_grow(context, &terms->host, &terms->capacity, count, sizeof *terms->host, "terms");
+    if (status != OVOID_OK)
+        return status;
+    const double log2_cutoff = log2(cutoff);
+    for (size_t i = 0; i < count; ++i)
+        if (!to_term(&quadrics[i], origin, log2_cutoff, &terms->host[i]))
+            return ov_fail(context, OVOID_ERROR_NUMERIC,
+                           "ellipsoid %zu is degenerate: amplitude %g, centre (%g, %g, %g), A's "
+                           "diagonal (%g, %g, %g)",
+                           i + 1, quadrics[i].amplitude, quadrics[i].centre[0],
+                           quadrics[i].centre[1], quadrics[i].centre[2], quadrics[i].a[0],
+                           quadrics[i].a[3], quadrics[i].a[5]);
+    terms->count = count;
+    OV_TRY(ov_buffer_reserve(context, &terms->device, count * sizeof *terms->host, "terms"));
+    OV_TRY(ov_buffer_write(context, &terms->device, 0, terms->host, count * sizeof *terms->host));
+cleanup:
+    return status;
+}
+
+void ov_terms_destroy(ov_terms *terms) {
+    free(terms->host);
+    ov_buffer_destroy(&terms->device);
+    memset(terms, 0, sizeof *terms);
+}

@@ -1,0 +1,40 @@
+/* The public functions that evaluate a molecule's or a model's field. */
+#include "field/evaluate.h"
+#include "fit/model.h"
+
+#include <stdlib.h>
+
+ovoid_status ovoid_molecule_field(ovoid_context *context, const ovoid_molecule *molecule,
+                                  double decay, const double *xyz, size_t count, double *value,
+                                  double *gradient) {
+    if (!context || !molecule || (count > 0 && (!xyz || !value)))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_field: an argument is NULL");
+    if (!(decay > 0.0 && decay <= 100.0))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
+                       decay);
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    const double *const xyzr = ovoid_molecule_xyzr(molecule);
+    ov_quadric *const quadrics = ov_alloc(context, atoms, sizeof *quadrics, "atoms");
+    if (!quadrics)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < atoms; ++i)
+        ov_quadric_of_atom(xyzr + 4 * i, decay, &quadrics[i]);
+    const ovoid_status status = ov_evaluate(context, quadrics, atoms, xyz, count, value, gradient);
+    free(quadrics);
+    return status;
+}
+
+ovoid_status ovoid_model_field(ovoid_context *context, const ovoid_model *model, const double *xyz,
+                               size_t count, double *value, double *gradient) {
+    if (!context || !model || (count > 0 && (!xyz || !value)))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_field: an argument is NULL");
+    ov_quadric *const quadrics = ov_alloc(context, model->count, sizeof *quadrics, "ellipsoids");
+    if (!quadrics)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < model->count; ++i)
+        ov_quadric_of_ellipsoid(&model->ellipsoids[i], &quadrics[i]);
+    const ovoid_status status =
+        ov_evaluate(context, quadrics, model->count, xyz, count, value, gradient);
+    free(quadrics);
+    return status;
+}

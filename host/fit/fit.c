@@ -1,0 +1,59 @@
+#include "fit/l1.h"
+#include "fit/options.h"
+
+#include <stdlib.h>
+
+static bool report_sampling(const ovoid_fit_options *options, size_t atoms) {
+    if (!options->progress)
+        return true;
+    const ovoid_progress progress = {
+        .stage = "sample", .iterations = options->l1.iterations, .ellipsoids = atoms};
+    return options->progress(&progress, options->user);
+}
+
+/* Section 3.2.1 of the paper: |phi - c| <= 1. */
+static ovoid_status sample_band(ovoid_context *context, const ovoid_molecule *molecule,
+                                const ovoid_fit_options *options, ov_samples *samples) {
+    const double *const xyzr = ovoid_molecule_xyzr(molecule);
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    const ov_band band = {.low = options->isovalue - 1.0, .high = options->isovalue + 1.0};
+    ov_lattice lattice;
+    const ovoid_status status =
+        ov_lattice_create(context, xyzr, atoms, options->spacing, options->padding, &lattice);
+    return status != OVOID_OK
+               ? status
+               : ov_sample(context, xyzr, atoms, options->decay, &lattice, band, samples);
+}
+
+ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
+                       const ovoid_fit_options *options, ovoid_model **model,
+                       ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    ov_samples samples = {0};
+    ovoid_ellipsoid *ellipsoids = NULL;
+    ovoid_fit_result done = {0};
+    ov_device *device;
+    if (!context || !molecule || !options || !model)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_fit: an argument is NULL");
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    const double began = ov_seconds();
+    OV_TRY(ov_fit_options_check(context, options));
+    OV_TRY(ov_device_get(context, &device));
+    if (!report_sampling(options, atoms)) {
+        status = ov_fail(context, OVOID_ERROR_CANCELLED, "stopped before sampling");
+        goto cleanup;
+    }
+    OV_TRY(sample_band(context, molecule, options, &samples));
+    done.sample_seconds = ov_seconds() - began;
+    OV_TRY(ov_l1_fit(context, ovoid_molecule_xyzr(molecule), atoms, &samples, options, began,
+                     &ellipsoids, &done));
+    OV_TRY(ovoid_model_create(context, ellipsoids, (size_t)done.ellipsoids, options->decay,
+                              options->isovalue, model));
+    done.fit_seconds = ov_seconds() - began - done.sample_seconds;
+    if (result)
+        *result = done;
+cleanup:
+    free(ellipsoids);
+    ov_samples_destroy(&samples);
+    return status;
+}

@@ -1,0 +1,64 @@
+#include "fit/options.h"
+
+#include <math.h>
+
+void ovoid_fit_options_init(ovoid_fit_options *options) {
+    if (!options)
+        return;
+    *options = (ovoid_fit_options){
+        .method = OVOID_METHOD_L1,
+        .decay = OVOID_DEFAULT_DECAY,
+        .isovalue = OVOID_DEFAULT_ISOVALUE,
+        .spacing = 1.0,
+        .padding = 2.0,
+        .l1 =
+            {
+                .iterations = 8000,
+                .sparse_iterations = 6000,
+                .epsilon = 0.01,
+                .max_error = 0.5,
+                .prune_below = 1e-3,
+                .prune_every = 20,
+                .armijo = 1e-4,
+                .shrink = 0.5,
+                .grow = 2.0,
+                .max_backtracks = 30,
+            },
+    };
+}
+
+typedef struct range {
+    const char *name;
+    double value, low, high; /* low < value <= high */
+} range;
+
+ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_options *options) {
+    const ovoid_l1_options *const l1 = &options->l1;
+    const range ranges[] = {
+        {"decay", options->decay, 0.0, 100.0},
+        {"isovalue", options->isovalue, 0.0, 1e6},
+        {"spacing", options->spacing, 0.0, 1e3},
+        {"padding", options->padding, -1e-300, 1e3},
+        {"iterations", l1->iterations, 0.0, UINT32_MAX},
+        {"epsilon", l1->epsilon, 0.0, 1.0},
+        {"max_error", l1->max_error, 0.0, INFINITY},
+        {"prune_below", l1->prune_below, -1e-300, 1e3},
+        {"prune_every", l1->prune_every, 0.0, UINT32_MAX},
+        {"armijo", l1->armijo, 0.0, 0.999},
+        {"shrink", l1->shrink, 0.0, 0.999},
+        {"grow", l1->grow, 0.999, 1e6},
+        {"max_backtracks", l1->max_backtracks, 0.0, 1000.0},
+    };
+    if (options->method != OVOID_METHOD_L1)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown method %d", (int)options->method);
+    for (size_t k = 0; k < sizeof ranges / sizeof ranges[0]; ++k)
+        if (!(ranges[k].value > ranges[k].low && ranges[k].value <= ranges[k].high))
+            return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                           "option %s = %g is not above %g and at most %g", ranges[k].name,
+                           ranges[k].value, ranges[k].low, ranges[k].high);
+    if (l1->sparse_iterations > l1->iterations)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option sparse_iterations = %lu is more than iterations = %lu",
+                       (unsigned long)l1->sparse_iterations, (unsigned long)l1->iterations);
+    return OVOID_OK;
+}

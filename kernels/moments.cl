@@ -1,0 +1,136 @@
+/*
+ * Sums over the points that a term reaches (design: operation "moments"): for each term i
+ * sum_k u_k e_i(y_k) m(y_k - mu_i), m the OV_MONOMIALS monomials of shared.h.
+ *
+ * start, item: the packs of term i are item[start[i]] .. item[start[i + 1] - 1].
+ * u: weights of the points, OV_PACK per pack, 0 for points that only fill up the last pack.
+ * moments: OV_MONOMIALS pairs (high, low) per term; the sum is high + low. Floats are summed over a
+ * few thousand points and then added to a two-float total, so no device needs double precision.
+ *
+ * One term per OV_LANES work-items. u e is computed for a tile of packs first and the ten sums in a
+ * second loop: one fused loop needs more registers than there are.
+ */
+
+#define OV_TILE_PACKS 16
+#define OV_TILE (OV_TILE_PACKS * OV_VECTORS)
+#define OV_FLUSH_TILES 8
+
+/* high + low += value, error free (Knuth's two-sum). */
+inline void ov_add(ov_vec *high, ov_vec *low, ov_vec value) {
+    const ov_vec sum = *high + value;
+    const ov_vec part = sum - *high;
+    *low += (*high - (sum - part)) + (value - part);
+    *high = sum;
+}
+
+inline void ov_add_scalar(float *high, float *low, float value) {
+    const float sum = *high + value;
+    const float part = sum - *high;
+    *low += (*high - (sum - part)) + (value - part);
+    *high = sum;
+}
+
+#if OV_LANES > 1
+/* Adds up the lanes' pairs in a fixed order; lane 0 holds the result. */
+inline void ov_add_lanes(float *high, float *low, uint lane, __local float *scratch) {
+    for (uint width = OV_LANES / 2; width > 0; width /= 2) {
+        scratch[2 * lane] = *high;
+        scratch[2 * lane + 1] = *low;
+        barrier(CLK_LOCAL_MEM_FENCE);
+        if (lane < width) {
+            ov_add_scalar(high, low, scratch[2 * (lane + width)]);
+            *low += scratch[2 * (lane + width) + 1];
+        }
+        barrier(CLK_LOCAL_MEM_FENCE);
+    }
+}
+#endif
+
+__kernel void moments(const uint count, __global const float *restrict points,
+                      __global const float *restrict u, __global const uint *restrict start,
+                      __global const uint *restrict item, __global const ov_term *restrict terms,
+                      __global float *restrict result) {
+    const uint index = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
+#if OV_LANES == 1
+    if (index >= count)
+        return;
+#endif
+    /* with several lanes a group is exactly one term, so all of it takes part in the barriers */
+    const ov_term t = terms[index];
+    ov_vec total[OV_MONOMIALS], rest[OV_MONOMIALS], sum[OV_MONOMIALS];
+#pragma unroll
+    for (uint m = 0; m < OV_MONOMIALS; ++m)
+        total[m] = rest[m] = sum[m] = 0.0f;
+
+    const uint end = start[index + 1];
+    uint tiles = 0;
+    for (uint first = start[index]; first < end; first += OV_TILE_PACKS) {
+        const uint packs = min((uint)OV_TILE_PACKS, end - first);
+        ov_vec ue[OV_TILE];
+        for (uint k = 0; k < packs; ++k) {
+            const size_t pack = item[first + k];
+            __global const float *const p = points + pack * (3 * OV_PACK);
+#pragma unroll
+            for (uint v = 0; v < OV_VECTORS; ++v) {
+                const uint at = v * OV_LANES + lane;
+                const ov_vec x = OV_LOAD(at, p) - t.x, y = OV_LOAD(at, p + OV_PACK) - t.y,
+                             z = OV_LOAD(at, p + 2 * OV_PACK) - t.z;
+                ue[k * OV_VECTORS + v] = OV_LOAD(at, u + pack * OV_PACK) * ov_value(t, x, y, z);
+            }
+        }
+        for (uint k = 0; k < packs; ++k) {
+            const size_t pack = item[first + k];
+            __global const float *const p = points + pack * (3 * OV_PACK);
+#pragma unroll
+            for (uint v = 0; v < OV_VECTORS; ++v) {
+                const uint at = v * OV_LANES + lane;
+                const ov_vec x = OV_LOAD(at, p) - t.x, y = OV_LOAD(at, p + OV_PACK) - t.y,
+                             z = OV_LOAD(at, p + 2 * OV_PACK) - t.z;
+                const ov_vec e = ue[k * OV_VECTORS + v];
+                const ov_vec ex = e * x, ey = e * y, ez = e * z;
+                sum[0] += e;
+                sum[1] += ex;
+                sum[2] += ey;
+                sum[3] += ez;
+                sum[4] = fma(ex, x, sum[4]);
+                sum[5] = fma(ex, y, sum[5]);
+                sum[6] = fma(ex, z, sum[6]);
+                sum[7] = fma(ey, y, sum[7]);
+                sum[8] = fma(ey, z, sum[8]);
+                sum[9] = fma(ez, z, sum[9]);
+            }
+        }
+        if (++tiles == OV_FLUSH_TILES) {
+            tiles = 0;
+#pragma unroll
+            for (uint m = 0; m < OV_MONOMIALS; ++m) {
+                ov_add(&total[m], &rest[m], sum[m]);
+                sum[m] = 0.0f;
+            }
+        }
+    }
+
+#if OV_LANES > 1
+    __local float scratch[2 * OV_LANES];
+#endif
+#pragma unroll
+    for (uint m = 0; m < OV_MONOMIALS; ++m) {
+        ov_add(&total[m], &rest[m], sum[m]);
+        float high = 0.0f, low = 0.0f;
+        float part[OV_VECTOR], part_rest[OV_VECTOR];
+        OV_STORE(total[m], 0, part);
+        OV_STORE(rest[m], 0, part_rest);
+        for (uint c = 0; c < OV_VECTOR; ++c) {
+            ov_add_scalar(&high, &low, part[c]);
+            low += part_rest[c];
+        }
+#if OV_LANES > 1
+        ov_add_lanes(&high, &low, lane, scratch);
+        if (lane == 0)
+#endif
+        {
+            result[((size_t)index * OV_MONOMIALS + m) * 2] = high;
+            result[((size_t)index * OV_MONOMIALS + m) * 2 + 1] = low;
+        }
+    }
+}

@@ -1,0 +1,37 @@
+/*
+ * Residual of a model at the points, with what the objective and the gate need per pack.
+ *
+ * u[k] = value[k] - target[k] for k < count, 0 for the points that fill up the last pack.
+ * sums: per pack sum_k u_k^2 and max_k |u_k|.
+ * One work-item per pack, whatever the shape: the kernel is bound by memory.
+ */
+__kernel void residual(const uint packs, const uint count, __global const float *restrict value,
+                       __global const float *restrict target, __global float *restrict u,
+                       __global float *restrict sums) {
+    const uint pack = get_global_id(0);
+    if (pack >= packs)
+        return;
+    const size_t first = (size_t)pack * OV_PACK;
+    const uint used = min((uint)OV_PACK, (uint)(count - first));
+    if (used < OV_PACK) {
+        float sum = 0.0f, largest = 0.0f;
+        for (uint k = 0; k < OV_PACK; ++k) {
+            const float r = k < used ? value[first + k] - target[first + k] : 0.0f;
+            u[first + k] = r;
+            sum = fma(r, r, sum);
+            largest = max(largest, fabs(r));
+        }
+        sums[2 * pack] = sum;
+        sums[2 * pack + 1] = largest;
+        return;
+    }
+    float4 sum = 0.0f, largest = 0.0f;
+    for (uint k = 0; k < OV_PACK / 4; ++k) {
+        const float4 r = vload4(k, value + first) - vload4(k, target + first);
+        vstore4(r, k, u + first);
+        sum = fma(r, r, sum);
+        largest = max(largest, fabs(r));
+    }
+    sums[2 * pack] = (sum.x + sum.y) + (sum.z + sum.w);
+    sums[2 * pack + 1] = max(max(largest.x, largest.y), max(largest.z, largest.w));
+}

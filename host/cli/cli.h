@@ -1,0 +1,126 @@
+/*
+ * What the subcommands share: exit codes, messages, options, signals. The tool uses nothing of the
+ * library but its public header.
+ */
+#ifndef CLI_H
+#define CLI_H
+
+#include "ovoid/ovoid.h"
+
+#include <cJSON.h>
+#include <getopt.h>
+#include <stdio.h>
+
+/* Exit codes, documented in --help. A signal that ended the work gives 128 + its number. */
+enum {
+    CLI_OK = 0,
+    CLI_INTERNAL = 1, /* OpenCL or the program itself failed */
+    CLI_USAGE = 2,    /* unknown or bad options */
+    CLI_INPUT = 3,    /* an input cannot be read or makes no sense */
+    CLI_OUTPUT = 4,   /* an output cannot be written */
+    CLI_DEVICE = 5,   /* no OpenCL device, or none that matches */
+    CLI_COMPUTE = 6   /* out of memory, over a limit, or numbers that are not finite */
+};
+
+/* ---- main.c: messages ----------------------------------------------------------------------- */
+
+/* "ovoid: error: ..." and "ovoid: warning: ..." on standard error, erasing the progress line. */
+#if defined(__GNUC__)
+__attribute__((format(printf, 1, 2)))
+#endif
+void
+cli_error(const char *format, ...);
+#if defined(__GNUC__)
+__attribute__((format(printf, 1, 2)))
+#endif
+void
+cli_warning(const char *format, ...);
+
+/* An ovoid_warning_fn; user is a bool: quiet. */
+void cli_on_warning(const char *text, void *quiet);
+
+/* Reports the context's error, unless a signal is behind it, and returns the exit code for
+ * `status`; `io` is the one for OVOID_ERROR_IO: CLI_INPUT or CLI_OUTPUT. */
+int cli_failure(const ovoid_context *context, ovoid_status status, int io);
+
+/* The exit codes and environment variables, as the helps show them. */
+void cli_print_exit_codes(FILE *stream);
+void cli_print_environment(FILE *stream);
+
+/* Seconds of a monotonic clock. */
+double cli_seconds(void);
+
+/* Whether two paths lead to the same file, one that need not exist yet. */
+bool cli_same_file(const char *a, const char *b);
+
+/* ---- options.c ------------------------------------------------------------------------------ */
+
+/* A number that an option sets, in a structure of defaults. */
+typedef enum cli_kind { CLI_REAL, CLI_COUNT } cli_kind;
+typedef struct cli_number {
+    const char *name;  /* of the option, without the dashes */
+    cli_kind kind;     /* double or uint32_t */
+    size_t offset;     /* in the structure */
+    double low, high;  /* smallest and largest value */
+    bool above, below; /* low, high themselves are not allowed */
+    const char *unit;  /* "" for a pure number */
+    const char *help;
+} cli_number;
+
+/* Reads `text` into structure according to the number's kind and range; reports a usage error and
+ * returns false if it does not fit. */
+bool cli_number_parse(const cli_number *number, const char *text, void *structure);
+
+/* A help entry: name, meaning, and the value in the structure as the default. */
+void cli_number_help(const cli_number *number, const void *structure, FILE *stream);
+
+double cli_number_value(const cli_number *number, const void *structure);
+
+/* Explains what getopt_long() did not like about the option it has just met ('?' or ':', with an
+ * option string that begins with ':' and values above 255 for long options) and returns CLI_USAGE.
+ */
+int cli_bad_option(const char *command, int result, char **argv, const struct option *options);
+
+/* The name among `names` (NULL at the end) nearest to `text`, NULL if none is near. */
+const char *cli_nearest(const char *text, const char *const *names);
+
+/* ---- interrupt.c ---------------------------------------------------------------------------- */
+
+/* From now on the first SIGINT, SIGTERM or SIGHUP only raises a flag, a second one kills. Signals
+ * ignored by whoever started the program stay ignored. SIGPIPE becomes a write error. */
+void cli_catch_signals(void);
+
+/* Number of the signal that came, 0 for none. */
+int cli_interrupted(void);
+
+/* A file that a killing signal is to remove, NULL for none. The text must live until replaced. */
+void cli_remove_when_killed(const char *path);
+
+/* ---- progress.c ----------------------------------------------------------------------------- */
+
+/* Shows the state of a fit in one line of standard error if that is a terminal. */
+void cli_progress_start(bool quiet);
+void cli_progress_show(const ovoid_progress *progress);
+void cli_progress_erase(void);
+
+/* Whole seconds as text: "1 h 05 min", "2 min 07 s", "9 s". */
+void cli_print_duration(double seconds, char *text, size_t size);
+
+/* ---- json.c --------------------------------------------------------------------------------- */
+
+/* As their namesakes of cJSON, but text that is not UTF-8 (a file name may be anything) is made so.
+ */
+bool cli_json_string(cJSON *object, const char *key, const char *text);
+
+/* Writes the JSON text and a line end whole or not at all. */
+ovoid_status cli_json_write(ovoid_context *context, const cJSON *json, const char *path);
+
+/* ---- subcommands ---------------------------------------------------------------------------- */
+
+int cli_fit(int argc, char **argv);
+int cli_devices(int argc, char **argv);
+
+void cli_fit_help(FILE *stream);
+void cli_devices_help(FILE *stream);
+
+#endif

@@ -1,0 +1,116 @@
+#include "cli.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+enum { WIDTH_UNKNOWN = 80, WIDTH_MOST = 100, BAR = 20 };
+static const double redraw_seconds = 0.1;
+
+static struct {
+    bool enabled;
+    bool shown;        /* the line is on the screen */
+    double drawn;      /* when, in cli_seconds() */
+    double pace;       /* smoothed seconds per iteration, 0 before it is known */
+    double at_seconds; /* where the pace was last measured */
+    uint64_t at_iteration;
+} line;
+
+void cli_progress_start(bool quiet) {
+    const char *terminal = getenv("TERM");
+    memset(&line, 0, sizeof line);
+    line.enabled =
+        !quiet && isatty(STDERR_FILENO) && terminal && terminal[0] && strcmp(terminal, "dumb") != 0;
+}
+
+void cli_progress_erase(void) {
+    if (!line.shown)
+        return;
+    fputs("\r\033[K", stderr);
+    fflush(stderr);
+    line.shown = false;
+}
+
+static size_t terminal_width(void) {
+    struct winsize size;
+    size_t width = WIDTH_UNKNOWN;
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0)
+        width = size.ws_col;
+    return width < WIDTH_MOST ? width : WIDTH_MOST;
+}
+
+/* Follows the time of an iteration, which falls as ellipsoids go. */
+static void measure_pace(const ovoid_progress *progress) {
+    uint64_t done = progress->iteration - line.at_iteration;
+    double spent = progress->seconds - line.at_seconds;
+    if (done == 0 || spent <= 0.0)
+        return;
+    double now = spent / (double)done;
+    line.pace = line.pace > 0.0 ? 0.8 * line.pace + 0.2 * now : now;
+    line.at_iteration = progress->iteration;
+    line.at_seconds = progress->seconds;
+}
+
+void cli_print_duration(double seconds, char *text, size_t size) {
+    unsigned long s = (unsigned long)fmin(ceil(seconds), 1e8);
+    if (s >= 3600)
+        snprintf(text, size, "%lu h %02lu min", s / 3600, s / 60 % 60);
+    else if (s >= 60)
+        snprintf(text, size, "%lu min %02lu s", s / 60, s % 60);
+    else
+        snprintf(text, size, "%lu s", s);
+}
+
+/* Appends a part to the line if all of it fits. */
+static void append(char *text, size_t width, const char *part) {
+    size_t used = strlen(text), gap = used ? 2 : 0;
+    if (used + gap + strlen(part) > width)
+        return;
+    memset(text + used, ' ', gap);
+    strcpy(text + used + gap, part);
+}
+
+/* The parts in the order of their importance, as many as the terminal is wide enough for. */
+static void compose(const ovoid_progress *progress, char *text, size_t width) {
+    char part[96];
+    double share =
+        progress->iterations ? (double)progress->iteration / (double)progress->iterations : 0.0;
+    text[0] = '\0';
+    append(text, width, progress->stage);
+    if (progress->iteration == 0)
+        return;
+    snprintf(part, sizeof part, "%llu/%llu", (unsigned long long)progress->iteration,
+             (unsigned long long)progress->iterations);
+    append(text, width, part);
+    snprintf(part, sizeof part, "%llu ellipsoids", (unsigned long long)progress->ellipsoids);
+    append(text, width, part);
+    snprintf(part, sizeof part, "error %.3f", progress->max_error);
+    append(text, width, part);
+    if (line.pace > 0.0) {
+        double left = line.pace * (double)(progress->iterations - progress->iteration);
+        char duration[64];
+        cli_print_duration(left, duration, sizeof duration);
+        snprintf(part, sizeof part, "%s left", duration);
+        append(text, width, part);
+    }
+    int filled = (int)(share * BAR);
+    snprintf(part, sizeof part, "[%.*s%.*s]", filled, "####################", BAR - filled,
+             "....................");
+    append(text, width, part);
+}
+
+void cli_progress_show(const ovoid_progress *progress) {
+    double now = cli_seconds();
+    if (!line.enabled || (line.shown && now - line.drawn < redraw_seconds))
+        return;
+    if (progress->iteration > line.at_iteration)
+        measure_pace(progress);
+    char text[WIDTH_MOST + 1];
+    compose(progress, text, terminal_width() - 1); /* the last column would wrap */
+    fprintf(stderr, "\r%s\033[K", text);
+    fflush(stderr);
+    line.shown = true;
+    line.drawn = now;
+}

@@ -1,0 +1,117 @@
+#include "fit.h"
+
+#include <math.h>
+#include <string.h>
+
+/* One failure anywhere stays: no report with holes. */
+typedef struct builder {
+    cJSON *object;
+    bool good;
+} builder;
+
+static void add_number(builder *b, const char *key, double value) {
+    b->good = b->good && cJSON_AddNumberToObject(b->object, key, value);
+}
+
+static void add_string(builder *b, const char *key, const char *value) {
+    b->good = b->good && cli_json_string(b->object, key, value);
+}
+
+/* Microseconds are more than a clock of a busy machine can tell. */
+static void add_seconds(builder *b, const char *key, double seconds) {
+    add_number(b, key, round(seconds * 1e6) / 1e6);
+}
+
+static builder add_object(builder *b, const char *key) {
+    builder inner = {NULL, false};
+    inner.object = b->good ? cJSON_AddObjectToObject(b->object, key) : NULL;
+    inner.good = b->good = inner.object != NULL;
+    return inner;
+}
+
+/* Keys are the options' names with underscores. */
+static void add_numbers(builder *b, const cli_number *numbers, size_t count,
+                        const ovoid_fit_options *options) {
+    for (size_t i = 0; i < count; i++) {
+        char key[64];
+        snprintf(key, sizeof key, "%s", numbers[i].name);
+        for (char *c = key; *c; c++)
+            if (*c == '-')
+                *c = '_';
+        add_number(b, key, cli_number_value(&numbers[i], options));
+    }
+}
+
+static void add_molecule(builder *b, const fit_job *job) {
+    ovoid_molecule_counts counts = ovoid_molecule_read_counts(job->molecule);
+    add_string(b, "input", job->input);
+    add_number(b, "atoms", (double)counts.atoms);
+    add_number(b, "atoms_skipped", (double)counts.skipped);
+    add_number(b, "atoms_skipped_models", (double)counts.skipped_models);
+    add_number(b, "atoms_skipped_altlocs", (double)counts.skipped_altlocs);
+    add_number(b, "zero_radius_atoms", (double)counts.zero_radius);
+}
+
+static void add_result(builder *b, const fit_job *job) {
+    const ovoid_fit_result *result = &job->result;
+    add_string(b, "output", job->output);
+    add_number(b, "ellipsoids", (double)result->ellipsoids);
+    add_number(b, "sparse_ratio",
+               (double)result->ellipsoids / (double)ovoid_molecule_atoms(job->molecule));
+    add_number(b, "points", (double)result->points);
+    add_number(b, "rms_error", result->rms_error);
+    add_number(b, "max_error", result->max_error);
+    add_number(b, "iterations", (double)result->iterations);
+}
+
+static void add_device(builder *b, const ovoid_device_info *device) {
+    add_string(b, "device", device->name);
+    builder opencl = add_object(b, "opencl");
+    add_string(&opencl, "platform", device->platform);
+    add_string(&opencl, "vendor", device->vendor);
+    add_string(&opencl, "driver", device->driver);
+    add_string(&opencl, "version", device->opencl);
+    add_number(&opencl, "compute_units", device->compute_units);
+    b->good = opencl.good;
+}
+
+static void add_times(builder *b, const fit_job *job) {
+    builder seconds = add_object(b, "seconds");
+    add_seconds(&seconds, "device", job->device_seconds);
+    add_seconds(&seconds, "read", job->read_seconds);
+    add_seconds(&seconds, "sample", job->result.sample_seconds);
+    add_seconds(&seconds, "fit", job->result.fit_seconds);
+    add_seconds(&seconds, "write", job->write_seconds);
+    add_seconds(&seconds, "total", job->total_seconds);
+    b->good = seconds.good;
+    const ovoid_fit_profile *spent = &job->result.profile;
+    builder profile = add_object(b, "profile");
+    add_seconds(&profile, "lists_seconds", spent->lists_seconds);
+    add_seconds(&profile, "field_seconds", spent->field_seconds);
+    add_seconds(&profile, "moments_seconds", spent->moments_seconds);
+    add_seconds(&profile, "host_seconds", spent->host_seconds);
+    add_number(&profile, "list_builds", (double)spent->list_builds);
+    add_number(&profile, "field_passes", (double)spent->field_passes);
+    add_number(&profile, "moments_passes", (double)spent->moments_passes);
+    add_number(&profile, "launches", (double)spent->launches);
+    b->good = profile.good;
+}
+
+ovoid_status fit_report_write(const fit_job *job) {
+    builder b = {cJSON_CreateObject(), true};
+    b.good = b.object != NULL;
+    add_string(&b, "version", ovoid_version());
+    add_molecule(&b, job);
+    add_string(&b, "method", fit_method_name(job->options.method));
+    add_numbers(&b, fit_surface_numbers, fit_surface_count, &job->options);
+    builder options = add_object(&b, "options");
+    add_numbers(&options, fit_l1_numbers, fit_l1_count, &job->options);
+    b.good = options.good;
+    add_result(&b, job);
+    add_device(&b, ovoid_context_device(job->context));
+    add_times(&b, job);
+    ovoid_status status =
+        b.good ? cli_json_write(job->context, b.object, job->report) : OVOID_ERROR_MEMORY;
+    cJSON_Delete(b.object);
+    return status;
+}

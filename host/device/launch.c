@@ -33,7 +33,10 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     for (size_t i = 0; i < arg_count; i++) {
         cl_int code = clSetKernelArg(kernel->handle, (cl_uint)i, args[i].size, args[i].value);
         if (code != CL_SUCCESS)
-            return ov_cl_fail(context, code, "clSetKernelArg", kernel->name);
+            return ov_fail(context, OVOID_ERROR_OPENCL,
+                           "clSetKernelArg: %s (%d), argument %zu of kernel %s, device %s",
+                           ov_cl_name(code), (int)code, i, kernel->name,
+                           context->device->info.name);
     }
     if (local)
         global = (global + local - 1) / local * local;

@@ -1,0 +1,58 @@
+/*
+ * The readers of molecule files: one function per format that is given line after line, and one
+ * that is called at the end.
+ */
+#ifndef OV_MOLECULE_READER_H
+#define OV_MOLECULE_READER_H
+
+#include "molecule/fields.h"
+#include "molecule/molecule.h"
+#include "molecule/text.h"
+
+/* Whether the atoms seen so far might be those of a PDB file under another name (pqr.c). */
+typedef struct ov_pdb_suspicion {
+    bool cleared;     /* some atom cannot have come from a PDB file */
+    bool header;      /* records that PDB files have and PQR files hardly ever */
+    uint64_t ones;    /* atoms whose occupancy would be 1.00 */
+    uint64_t element; /* atoms with an element in the PDB columns */
+    double largest;   /* temperature factor */
+} ov_pdb_suspicion;
+
+typedef struct ov_reader {
+    ovoid_context *context;
+    ov_text *text;
+    ovoid_molecule *molecule;
+    size_t capacity; /* atoms that molecule->xyzr has room for */
+    bool guess;      /* the caller left the format open */
+
+    uint64_t unknown_lines; /* lines ignored for not being any known record */
+    uint64_t unknown_first; /* number of the first of them */
+    ov_quote unknown_text;
+
+    /* PQR */
+    uint64_t models;  /* MODEL records up to here, less those of models without atoms */
+    bool model_ended; /* ENDMDL behind an atom: what follows belongs to another model */
+    ov_pdb_suspicion pdb;
+
+    /* XYZR */
+    bool announced; /* the file began with a count line */
+    uint64_t announced_line;
+    double announced_atoms;
+} ov_reader;
+
+/* Appends an atom after checking that x, y, z and radius are finite and within the limits. */
+ovoid_status ov_reader_add(ov_reader *reader, const ov_line *line, const ov_field *x,
+                           const ov_field *y, const ov_field *z, const ov_field *radius);
+
+/* Counts a line that is left out without being understood. */
+void ov_reader_ignore(ov_reader *reader, const ov_line *line);
+
+/* Whether the line is an atom or another record that a PQR file may have. */
+bool ov_pqr_knows(const char *text, size_t length);
+ovoid_status ov_pqr_line(ov_reader *reader, const ov_line *line);
+ovoid_status ov_pqr_end(ov_reader *reader);
+
+ovoid_status ov_xyzr_line(ov_reader *reader, const ov_line *line);
+ovoid_status ov_xyzr_end(ov_reader *reader);
+
+#endif

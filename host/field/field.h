@@ -90,6 +90,10 @@ typedef struct ov_operations {
     ov_kernel field, field_polynomial, field_gradient, moments, residual;
 } ov_operations;
 
+/* Work-group for kernels whose work-items do not share anything: one item on CPUs, where a driver
+ * left to choose may put all of them in one group and so on one core. */
+size_t ov_item_group(const ov_device *device);
+
 /* Kernels are made on first use. */
 void ov_operations_destroy(ov_operations *operations);
 

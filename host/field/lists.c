@@ -46,7 +46,7 @@ cleanup:
 }
 
 static ovoid_status list_packs(ovoid_context *context, ov_lists *lists, const ov_points *points,
-                               const ov_terms *terms, double skin) {
+                               const ov_terms *terms, double skin, size_t group) {
     ovoid_status status = OVOID_OK;
     const cl_uint count = (cl_uint)terms->count;
     const cl_float grow = (cl_float)skin;
@@ -56,7 +56,7 @@ static ovoid_status list_packs(ovoid_context *context, ov_lists *lists, const ov
     OV_TRY(ov_buffer_reserve(context, &lists->term_start, bytes, "starts of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->term_item, sizeof(cl_uint), "packs of ellipsoids"));
     for (cl_uint fill = 0; fill <= 1; ++fill) {
-        OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, terms->count, 0, OV_ARG(count),
+        OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, terms->count, group, OV_ARG(count),
                          OV_ARG(terms->device.memory), OV_ARG(points->tree),
                          OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(fill),
                          OV_ARG(lists->count.memory), OV_ARG(lists->term_start.memory),
@@ -71,7 +71,7 @@ cleanup:
     return status;
 }
 
-static ovoid_status transpose(ovoid_context *context, ov_lists *lists, size_t packs) {
+static ovoid_status transpose(ovoid_context *context, ov_lists *lists, size_t packs, size_t group) {
     ovoid_status status = OVOID_OK;
     const cl_uint terms = (cl_uint)lists->terms, lists_count = (cl_uint)packs;
     size_t total = 0;
@@ -79,17 +79,17 @@ static ovoid_status transpose(ovoid_context *context, ov_lists *lists, size_t pa
                    "lists"));
     memset(lists->scan, 0, packs * sizeof *lists->scan);
     OV_TRY(ov_buffer_write(context, &lists->count, 0, lists->scan, packs * sizeof *lists->scan));
-    OV_TRY(OV_LAUNCH(context, &lists->count_transposed, lists->terms, 0, OV_ARG(terms),
+    OV_TRY(OV_LAUNCH(context, &lists->count_transposed, lists->terms, group, OV_ARG(terms),
                      OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
                      OV_ARG(lists->count.memory)));
     OV_TRY(scan_counts(context, lists, packs, &lists->pack_start, &total));
     OV_TRY(ov_buffer_write(context, &lists->count, 0, lists->scan, packs * sizeof *lists->scan));
     OV_TRY(ov_buffer_reserve(context, &lists->pack_item, total * sizeof(cl_uint),
                              "ellipsoids of packs"));
-    OV_TRY(OV_LAUNCH(context, &lists->fill_transposed, lists->terms, 0, OV_ARG(terms),
+    OV_TRY(OV_LAUNCH(context, &lists->fill_transposed, lists->terms, group, OV_ARG(terms),
                      OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
                      OV_ARG(lists->count.memory), OV_ARG(lists->pack_item.memory)));
-    OV_TRY(OV_LAUNCH(context, &lists->sort_lists, packs, 0, OV_ARG(lists_count),
+    OV_TRY(OV_LAUNCH(context, &lists->sort_lists, packs, group, OV_ARG(lists_count),
                      OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory)));
 cleanup:
     return status;
@@ -98,11 +98,14 @@ cleanup:
 ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
                             const ov_terms *terms, double skin) {
     ovoid_status status = OVOID_OK;
+    ov_device *device;
+    OV_TRY(ov_device_get(context, &device));
+    const size_t group = ov_item_group(device);
     OV_TRY(prepare(context, lists));
     lists->terms = terms->count;
     lists->packs = points->packs;
-    OV_TRY(list_packs(context, lists, points, terms, skin));
-    OV_TRY(transpose(context, lists, points->packs));
+    OV_TRY(list_packs(context, lists, points, terms, skin, group));
+    OV_TRY(transpose(context, lists, points->packs, group));
 cleanup:
     return status;
 }

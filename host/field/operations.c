@@ -15,6 +15,10 @@ void ov_operations_destroy(ov_operations *operations) {
     ov_kernel_destroy(&operations->residual);
 }
 
+size_t ov_item_group(const ov_device *device) {
+    return device->shape.lanes == 1 ? 1 : 64;
+}
+
 /* `groups` packs or terms, each handled by the shape's lanes as one work-group. */
 static ovoid_status launch_lanes(ovoid_context *context, const ov_kernel *kernel, size_t groups,
                                  const ov_arg *args, size_t arg_count) {
@@ -103,12 +107,14 @@ ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, cons
                          ov_buffer *sums) {
     ovoid_status status = OVOID_OK;
     const cl_uint packs = (cl_uint)points->packs, count = (cl_uint)points->count;
+    ov_device *device;
+    OV_TRY(ov_device_get(context, &device));
     OV_TRY(make(context, &operations->residual, "residual", "residual"));
     OV_TRY(reserve_values(context, points, u));
     OV_TRY(ov_buffer_reserve(context, sums, points->packs * 2 * sizeof(cl_float), "pack sums"));
-    OV_TRY(OV_LAUNCH(context, &operations->residual, points->packs, 0, OV_ARG(packs), OV_ARG(count),
-                     OV_ARG(value->memory), OV_ARG(target->memory), OV_ARG(u->memory),
-                     OV_ARG(sums->memory)));
+    OV_TRY(OV_LAUNCH(context, &operations->residual, points->packs, ov_item_group(device),
+                     OV_ARG(packs), OV_ARG(count), OV_ARG(value->memory), OV_ARG(target->memory),
+                     OV_ARG(u->memory), OV_ARG(sums->memory)));
 cleanup:
     return status;
 }

@@ -8,8 +8,14 @@
 
 /* A term counts where its value is at least this; the sum of what is left out stays near 1e-4. */
 #define CUTOFF 1e-5
-/* How far (angstrom) a cut-off ellipsoid may move before the lists are rebuilt. */
-#define SKIN 0.25
+/* How far (angstrom) a cut-off ellipsoid may move before the lists are rebuilt: widened when
+ * rebuilds come more often than every SKIN_FEW evaluations, narrowed when more rarely than every
+ * SKIN_MANY. */
+#define SKIN_FIRST 0.25
+#define SKIN_MIN 0.1
+#define SKIN_MAX 1.5
+#define SKIN_FEW 25
+#define SKIN_MANY 150
 /* The largest change of a parameter (angstrom, radian, ...) that a line search tries first, and the
  * one it starts from when it has no accepted step to go by. */
 #define FIRST_CHANGE_MAX 0.2
@@ -35,6 +41,8 @@ typedef struct fit {
     double *gradient;
     double *listed; /* parameters that the lists were built for */
     size_t listed_count;
+    double skin;        /* of the lists, angstrom */
+    uint64_t listed_at; /* evaluations done when they were built */
     ov_quadric *quadrics;
     float *moments; /* as read back */
     float *sums;    /* as read back */
@@ -78,17 +86,28 @@ static bool lists_cover(const fit *f, const double *x) {
     if (f->listed_count != f->count)
         return false;
     for (size_t i = 0; i < f->count; ++i)
-        if (outward_motion(f->listed + i * OV_L1_PARAMETERS, x + i * OV_L1_PARAMETERS) > SKIN)
+        if (outward_motion(f->listed + i * OV_L1_PARAMETERS, x + i * OV_L1_PARAMETERS) > f->skin)
             return false;
     return true;
+}
+
+/* By counts alone, not by the clock, so that two runs do the same. A pruned model does not tell. */
+static void adapt_skin(fit *f) {
+    const uint64_t passes = f->profile.field_passes - f->listed_at;
+    if (f->listed_count == f->count && passes < SKIN_FEW)
+        f->skin = fmin(1.5 * f->skin, SKIN_MAX);
+    else if (f->listed_count == f->count && passes > SKIN_MANY)
+        f->skin = fmax(f->skin / 1.5, SKIN_MIN);
+    f->listed_at = f->profile.field_passes;
 }
 
 static ovoid_status refresh_lists(fit *f, const double *x) {
     if (lists_cover(f, x))
         return OVOID_OK;
     const double start = ov_seconds();
+    adapt_skin(f);
     const ovoid_status status =
-        ov_lists_build(f->context, &f->lists, &f->samples->points, &f->terms, SKIN);
+        ov_lists_build(f->context, &f->lists, &f->samples->points, &f->terms, f->skin);
     memcpy(f->listed, x, f->count * OV_L1_PARAMETERS * sizeof *x);
     f->listed_count = f->count;
     f->profile.lists_seconds += ov_seconds() - start;
@@ -355,7 +374,11 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     ovoid_status status = OVOID_OK;
     ov_device *device;
     evaluation last;
-    fit f = {.context = context, .options = options, .samples = samples, .count = atoms};
+    fit f = {.context = context,
+             .options = options,
+             .samples = samples,
+             .count = atoms,
+             .skin = SKIN_FIRST};
     OV_TRY(ov_device_get(context, &device));
     const uint64_t launches = device->launches;
     OV_TRY(allocate(&f, atoms));

@@ -900,6 +900,7 @@ static void test_opens_itself(void **state) {
     assert_null(ovoid_context_device(context));
     check(context, ov_device_get(context, &device));
     assert_ptr_equal(ovoid_context_device(context), &device->info);
+    assert_true(context->close_device == ov_device_close);
     ov_device_close(context);
     assert_null(ovoid_context_device(context));
     ov_device_close(context);
@@ -1025,9 +1026,9 @@ static char *run_child(const char *selector, const char *const *environment) {
 }
 
 static const char *setting(const char *name, const char *value) {
-    static char settings[4][PATH_SIZE + 32];
+    static char settings[8][PATH_SIZE + 32];
     static int next;
-    char *text = settings[next++ % 4];
+    char *text = settings[next++ % 8];
     snprintf(text, sizeof settings[0], "%s=%s", name, value);
     return text;
 }
@@ -1135,20 +1136,58 @@ static void test_pocl_cache(void **state) {
     }
     write_text(in_scratch("plain"), "");
     mkdir(in_scratch("temporary"), 0700);
+    assert_int_equal(symlink(in_scratch("nowhere"), in_scratch("plain-link")), 0);
     const char *temporary = setting("TMPDIR", in_scratch("temporary"));
     const char *const cases[][3] = {
         {setting("POCL_CACHE_DIR", in_scratch("plain/x")), "XDG_CACHE_HOME", "HOME=/"},
+        {setting("POCL_CACHE_DIR", in_scratch("plain-link")), "XDG_CACHE_HOME", "HOME=/"},
         {"POCL_CACHE_DIR", setting("XDG_CACHE_HOME", in_scratch("plain/y")), "HOME=/"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char *text = CHILD("cpu", vendors, "FAKE_ICD=none", temporary, cases[i][0], cases[i][1],
                            cases[i][2]);
         assert_contains(text, "warning: PoCL's cache folder ");
-        assert_contains(text, in_scratch("plain/"));
+        assert_contains(text, in_scratch("plain"));
         assert_contains(text, in_scratch("temporary/ovoid-pocl-"));
         assert_contains(text, "ran: 48\n");
         free(text);
     }
+    /* PoCL aborts on an empty name. */
+    char *text = CHILD("cpu", vendors, "FAKE_ICD=none", "POCL_CACHE_DIR=");
+    assert_contains(text, "ran: 48\n");
+    assert_lacks(text, "warning");
+    free(text);
+}
+
+static void test_private_folder(void **state) {
+    (void)state;
+    char path[PATH_SIZE], again[PATH_SIZE];
+    struct stat info;
+    mkdir(in_scratch("private"), 0700);
+    assert_true(ov_private_folder(in_scratch("private"), path, sizeof path));
+    assert_int_equal(stat(path, &info), 0);
+    assert_int_equal(info.st_mode & 0777, 0700);
+    assert_true(ov_private_folder(in_scratch("private"), again, sizeof again)); /* as before */
+    assert_string_equal(path, again);
+    assert_int_equal(list_files(path, NULL), 0); /* no probe is left */
+
+    chmod(path, 0770); /* open to others */
+    assert_false(ov_private_folder(in_scratch("private"), again, sizeof again));
+    chmod(path, 0700);
+    if (geteuid() == 0) { /* another's */
+        assert_int_equal(chown(path, 12345, (gid_t)-1), 0);
+        assert_false(ov_private_folder(in_scratch("private"), again, sizeof again));
+    }
+    rmdir(path);
+    mkdir(in_scratch("target"), 0700);
+    assert_int_equal(symlink(in_scratch("target"), path), 0);
+    assert_false(ov_private_folder(in_scratch("private"), again, sizeof again));
+    unlink(path);
+    write_text(path, "");
+    assert_false(ov_private_folder(in_scratch("private"), again, sizeof again));
+    assert_false(ov_private_folder("relative", again, sizeof again));
+    assert_false(ov_private_folder(NULL, again, sizeof again));
+    assert_false(ov_private_folder(in_scratch("private"), again, 20)); /* no room for the path */
 }
 
 int main(int argc, char **argv) {
@@ -1183,6 +1222,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test_setup(test_failing_platform, clear_environment),
         cmocka_unit_test_setup(test_defective_devices, clear_environment),
         cmocka_unit_test_setup(test_pocl_cache, clear_environment),
+        cmocka_unit_test_setup(test_private_folder, clear_environment),
     };
     const char *base = getenv("TMPDIR");
     if (argc == 3 && strcmp(argv[1], "child") == 0)

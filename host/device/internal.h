@@ -59,6 +59,11 @@ const char *ov_device_type_name(ovoid_device_type type);
  * when there is nothing to say. */
 void ov_pocl_prepare(char *warning, size_t size);
 
+/* Makes, or finds, the folder <base>/ovoid-pocl-<user id> that nobody else can have made or can
+ * reach. False when base is no absolute path, or what is there is another's, open to others, a
+ * link, or cannot be written. */
+bool ov_private_folder(const char *base, char *path, size_t size);
+
 /* Creates a folder and those above it, mode 0700 each. False with errno when that fails. */
 bool ov_make_folders(const char *path);
 

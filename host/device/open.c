@@ -166,7 +166,7 @@ static bool parse_shape(const char *text, ov_shape *shape) {
         return false;
     if (vector != 1 && vector != 4 && vector != 8 && vector != 16)
         return false;
-    if (!lanes || (lanes & (lanes - 1)) || OV_PACK % (vector * lanes))
+    if (!lanes || OV_PACK % (vector * lanes)) /* OV_PACK is a power of two: so is lanes */
         return false;
     *shape = (ov_shape){vector, lanes};
     return true;

@@ -105,7 +105,7 @@ static void pocl_folder(char *path, size_t size) {
         snprintf(path, size, "/tmp/pocl/kcache");
 }
 
-static bool try_private(const char *base, char *path, size_t size) {
+bool ov_private_folder(const char *base, char *path, size_t size) {
     if (!base || base[0] != '/')
         return false;
     int length = snprintf(path, size, "%s/ovoid-pocl-%ld", base, (long)geteuid());
@@ -122,9 +122,9 @@ void ov_pocl_prepare(char *warning, size_t size) {
     if (can_make(wanted))
         return;
     const char *reason = strerror(errno);
-    bool found = try_private(getenv("TMPDIR"), taken, sizeof taken) ||
-                 try_private("/tmp", taken, sizeof taken) ||
-                 try_private("/dev/shm", taken, sizeof taken);
+    bool found = ov_private_folder(getenv("TMPDIR"), taken, sizeof taken) ||
+                 ov_private_folder("/tmp", taken, sizeof taken) ||
+                 ov_private_folder("/dev/shm", taken, sizeof taken);
     if (found && setenv("POCL_CACHE_DIR", taken, 1) == 0)
         snprintf(warning, size,
                  "PoCL's cache folder %s cannot be written (%s); it uses %s for this run", wanted,

@@ -295,7 +295,7 @@ static void pqr_lines_are_read(void **state) {
 /* The line stands third, so that line numbers count; an error there must be ":3:column: text". */
 static void expect_bad_line(const char *name, const char *before, const char *line, size_t column,
                             const char *text) {
-    char file[1024], expected[256];
+    char file[1024], expected[512];
     int count = snprintf(file, sizeof file, "%s%s\n", before, line);
     snprintf(expected, sizeof expected, "%s:3:%zu: ", path_of(name), column);
     ovoid_molecule *molecule = NULL;

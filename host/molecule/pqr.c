@@ -99,7 +99,7 @@ typedef struct ov_tail {
 
 static void find_tail(const char *begin, const char *end, ov_tail *tail) {
     tail->count = 0;
-    tail->behind.length = 0;
+    tail->behind = (ov_field){0};
     const char *p = end;
     while (tail->count <= FIELDS) {
         while (p > begin && ov_blank(p[-1]))

@@ -10,7 +10,7 @@ typedef struct ov_lane_points {
     ov_vec x[OV_VECTORS], y[OV_VECTORS], z[OV_VECTORS];
 } ov_lane_points;
 
-inline void ov_load_points(ov_lane_points *lane_points, __global const float *points, uint pack,
+static inline void ov_load_points(ov_lane_points *lane_points, __global const float *points, uint pack,
                            uint lane) {
     __global const float *const x = points + (size_t)pack * (3 * OV_PACK);
 #pragma unroll

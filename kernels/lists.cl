@@ -22,7 +22,7 @@ typedef OV_JOIN(int, OV_TEST) ov_test_hit;
 #define OV_TEST_STORE OV_JOIN(vstore, OV_TEST)
 
 /* -1 where the term may meet the box low..high (relative to its centre), else 0. */
-inline ov_test_hit ov_meets(const ov_term t, ov_test lx, ov_test ly, ov_test lz, ov_test hx,
+static inline ov_test_hit ov_meets(const ov_term t, ov_test lx, ov_test ly, ov_test lz, ov_test hx,
                             ov_test hy, ov_test hz) {
     const ov_test zero = 0.0f;
     ov_test x = clamp(zero, lx, hx), y = clamp(zero, ly, hy), z = clamp(zero, lz, hz);
@@ -43,7 +43,7 @@ inline ov_test_hit ov_meets(const ov_term t, ov_test lx, ov_test ly, ov_test lz,
 }
 
 /* Tests the term against the boxes of one group; hit[j] != 0 where box j may be reached. */
-inline void ov_test_group(const ov_term t, __global const float *group, float skin, int *hit) {
+static inline void ov_test_group(const ov_term t, __global const float *group, float skin, int *hit) {
 #pragma unroll
     for (uint v = 0; v < OV_GROUP_VECTORS; ++v) {
         const ov_test lx = OV_TEST_LOAD(v, group) - (t.x + skin);

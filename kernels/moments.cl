@@ -16,14 +16,14 @@
 #define OV_FLUSH_TILES 8
 
 /* high + low += value, error free (Knuth's two-sum). */
-inline void ov_add(ov_vec *high, ov_vec *low, ov_vec value) {
+static inline void ov_add(ov_vec *high, ov_vec *low, ov_vec value) {
     const ov_vec sum = *high + value;
     const ov_vec part = sum - *high;
     *low += (*high - (sum - part)) + (value - part);
     *high = sum;
 }
 
-inline void ov_add_scalar(float *high, float *low, float value) {
+static inline void ov_add_scalar(float *high, float *low, float value) {
     const float sum = *high + value;
     const float part = sum - *high;
     *low += (*high - (sum - part)) + (value - part);
@@ -32,7 +32,7 @@ inline void ov_add_scalar(float *high, float *low, float value) {
 
 #if OV_LANES > 1
 /* Adds up the lanes' pairs in a fixed order; lane 0 holds the result. */
-inline void ov_add_lanes(float *high, float *low, uint lane, __local float *scratch) {
+static inline void ov_add_lanes(float *high, float *low, uint lane, __local float *scratch) {
     for (uint width = OV_LANES / 2; width > 0; width /= 2) {
         scratch[2 * lane] = *high;
         scratch[2 * lane + 1] = *low;

@@ -35,11 +35,13 @@ typedef struct fit {
     ovoid_context *context;
     const ovoid_fit_options *options;
     const ov_samples *samples;
-    size_t count; /* ellipsoids */
-    double *x;    /* accepted parameters, OV_L1_PARAMETERS per ellipsoid */
-    double *trial;
-    double *gradient;
-    double *listed; /* parameters that the lists were built for */
+    size_t count;            /* ellipsoids */
+    double *x;               /* accepted parameters, OV_L1_PARAMETERS per ellipsoid */
+    double *trial;           /* between searches: the parameters before the last accepted step */
+    double *gradient;        /* at x */
+    double *gradient_before; /* at trial, between searches */
+    bool comparable;         /* both gradients are of E_s alone, for the same ellipsoids */
+    double *listed;          /* parameters that the lists were built for */
     size_t listed_count;
     double skin;        /* of the lists, angstrom */
     uint64_t listed_at; /* evaluations done when they were built */
@@ -158,6 +160,9 @@ static double sparse_term(const double *x, size_t count) {
 static ovoid_status compute_gradient(fit *f, weights w) {
     ovoid_status status = OVOID_OK;
     const double start = ov_seconds();
+    double *const swap = f->gradient;
+    f->gradient = f->gradient_before;
+    f->gradient_before = swap;
     OV_TRY(ov_moments(f->context, &f->operations, &f->samples->points, &f->terms, &f->lists,
                       &f->residual, &f->moment_sums));
     OV_TRY(ov_buffer_read(f->context, &f->moment_sums, 0, f->moments,
@@ -212,6 +217,29 @@ static weights choose_weights(const ovoid_l1_options *l1, evaluation now, double
     return (weights){.accuracy = fmax(now.accuracy / total, l1->epsilon), .sparse = sparse / total};
 }
 
+/* Short Barzilai-Borwein step (J. Barzilai, J. M. Borwein, IMA J. Numer. Anal. 8 (1988) 141, eq.
+ * 5): the inverse curvature along the last step. 0 where there is none to go by. */
+static double secant_step(const fit *f, size_t size) {
+    double s_y = 0.0, y_y = 0.0;
+    for (size_t j = 0; j < size; ++j) {
+        const double s = f->x[j] - f->trial[j], y = f->gradient[j] - f->gradient_before[j];
+        s_y += s * y;
+        y_y += y * y;
+    }
+    return s_y > 0.0 ? s_y / y_y : 0.0;
+}
+
+/* The step that a search tries first. Between two iterations that minimise E_s alone the secant
+ * step fits; otherwise the last accepted one, grown. */
+static double first_step(const fit *f, size_t size, double largest) {
+    double step = 0.0;
+    if (f->comparable && f->options->l1.first_step == OVOID_FIRST_STEP_SECANT)
+        step = secant_step(f, size);
+    if (!(step > 0.0))
+        step = f->step > 0.0 ? f->options->l1.grow * f->step : FIRST_CHANGE / largest;
+    return fmin(step, FIRST_CHANGE_MAX / largest);
+}
+
 /* Steps 5.7 and 5.8: backtracking along -grad f until f falls by armijo * tau * |grad f|^2. On
  * success the trial becomes x and *now its evaluation; *tau is 0 where no step was found. */
 static ovoid_status line_search(fit *f, weights w, evaluation *now, double *tau) {
@@ -227,8 +255,7 @@ static ovoid_status line_search(fit *f, weights w, evaluation *now, double *tau)
     if (!(largest > 0.0))
         return OVOID_OK;
     const double before = w.accuracy * now->accuracy + w.sparse * sparse_term(f->x, f->count);
-    double step = f->step > 0.0 ? l1->grow * f->step : FIRST_CHANGE / largest;
-    step = fmin(step, FIRST_CHANGE_MAX / largest);
+    double step = first_step(f, size, largest);
     for (uint32_t k = 0; k < l1->max_backtracks; ++k, step *= l1->shrink) {
         for (size_t j = 0; j < size; ++j)
             f->trial[j] = f->x[j] - step * f->gradient[j];
@@ -280,20 +307,24 @@ static ovoid_status iterate(fit *f, double began, evaluation *now, uint64_t *ite
     const ovoid_l1_options *const l1 = &f->options->l1;
     uint64_t sparse_end = l1->sparse_iterations;
     unsigned failures = 0;
+    bool alone_before = false; /* the last accepted step went along the gradient of E_s alone */
     *iterations = 0;
     OV_TRY(evaluate(f, f->x, now));
     for (uint64_t n = 1; n <= l1->iterations; ++n) {
         double tau;
-        if (n % l1->prune_every == 0 && prune(f))
+        const bool pruned = n % l1->prune_every == 0 && prune(f);
+        if (pruned ||
+            failures > 0) /* after a failure the device holds a rejected trial's residual */
             OV_TRY(evaluate(f, f->x, now));
-        else if (failures > 0)
-            OV_TRY(evaluate(f, f->x, now)); /* the residual on the device is a rejected trial's */
         const bool accuracy_phase = n > sparse_end;
         const weights w = choose_weights(l1, *now, sparse_term(f->x, f->count), accuracy_phase);
+        const bool alone = w.sparse == 0.0;
         OV_TRY(compute_gradient(f, w));
+        f->comparable = alone && alone_before && !pruned;
         OV_TRY(line_search(f, w, now, &tau));
         *iterations = n;
         failures = tau > 0.0 ? 0 : failures + 1;
+        alone_before = alone && tau > 0.0;
         if (!report(f, n, accuracy_phase, w, *now, tau, began)) {
             status = ov_fail(f->context, OVOID_ERROR_CANCELLED, "stopped at iteration %llu of %lu",
                              (unsigned long long)n, (unsigned long)l1->iterations);
@@ -331,7 +362,7 @@ static void initialise(fit *f, const double *xyzr) {
 
 static ovoid_status allocate(fit *f, size_t atoms) {
     const size_t size = atoms * OV_L1_PARAMETERS;
-    double **const vectors[] = {&f->x, &f->trial, &f->gradient, &f->listed};
+    double **const vectors[] = {&f->x, &f->trial, &f->gradient, &f->gradient_before, &f->listed};
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; ++k)
         if (!(*vectors[k] = ov_alloc(f->context, size, sizeof(double), "parameters")))
             return OVOID_ERROR_MEMORY;
@@ -345,6 +376,7 @@ static void destroy(fit *f) {
     free(f->x);
     free(f->trial);
     free(f->gradient);
+    free(f->gradient_before);
     free(f->listed);
     free(f->quadrics);
     free(f->moments);

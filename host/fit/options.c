@@ -19,6 +19,7 @@ void ovoid_fit_options_init(ovoid_fit_options *options) {
                 .max_error = 0.5,
                 .prune_below = 1e-3,
                 .prune_every = 20,
+                .first_step = OVOID_FIRST_STEP_SECANT,
                 .armijo = 1e-4,
                 .shrink = 0.5,
                 .grow = 2.0,
@@ -51,6 +52,8 @@ ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_option
     };
     if (options->method != OVOID_METHOD_L1)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown method %d", (int)options->method);
+    if (l1->first_step != OVOID_FIRST_STEP_SECANT && l1->first_step != OVOID_FIRST_STEP_GROW)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown first step %d", (int)l1->first_step);
     for (size_t k = 0; k < sizeof ranges / sizeof ranges[0]; ++k)
         if (!(ranges[k].value > ranges[k].low && ranges[k].value <= ranges[k].high))
             return ov_fail(context, OVOID_ERROR_ARGUMENT,

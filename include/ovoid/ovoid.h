@@ -89,8 +89,8 @@ typedef struct ovoid_device_info {
     char name[128];
     char vendor[128];
     char platform[128];
-    char driver[64];         /* driver version */
-    char opencl[64];         /* e.g. "OpenCL 3.0 ..." as the device reports it */
+    char driver[64]; /* driver version */
+    char opencl[64]; /* e.g. "OpenCL 3.0 ..." as the device reports it */
     uint32_t compute_units;
     uint32_t clock_mhz;
     uint32_t float_width;    /* preferred vector width for float */
@@ -99,16 +99,16 @@ typedef struct ovoid_device_info {
     uint64_t max_allocation; /* bytes of one buffer */
 } ovoid_device_info;
 
-/* Lists every device of every platform. A platform that fails is skipped with a warning. *devices is
- * an array of *count entries to be freed with ovoid_free(). No device at all is not an error here:
- * *count is 0 and *devices NULL. */
+/* Lists every device of every platform. A platform that fails is skipped with a warning. *devices
+ * is an array of *count entries to be freed with ovoid_free(). No device at all is not an error
+ * here: *count is 0 and *devices NULL. */
 OVOID_API ovoid_status ovoid_devices(ovoid_context *context, ovoid_device_info **devices,
                                      size_t *count);
 
-/* Opens the device that selector names: an index ("0"), a type ("cpu", "gpu", "accelerator") or part
- * of a device or platform name in any case. NULL or "" takes the environment variable OVOID_DEVICE,
- * and without it the first GPU, else the first device. The first device whose match is found is
- * taken. Replaces the device opened before; objects made on that one must be gone. */
+/* Opens the device that selector names: an index ("0"), a type ("cpu", "gpu", "accelerator") or
+ * part of a device or platform name in any case. NULL or "" takes the environment variable
+ * OVOID_DEVICE, and without it the first GPU, else the first device. The first device whose match
+ * is found is taken. Replaces the device opened before; objects made on that one must be gone. */
 OVOID_API ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector);
 
 /* The opened device, NULL before one is opened. */
@@ -131,12 +131,12 @@ typedef enum ovoid_molecule_format {
 
 /* What a reader met. */
 typedef struct ovoid_molecule_counts {
-    uint64_t lines;        /* lines read */
-    uint64_t atoms;        /* atoms in the molecule */
-    uint64_t zero_radius;  /* of these, with radius 0 */
-    uint64_t skipped;      /* records that hold an atom but were left out, and why: */
-    uint64_t skipped_models;     /* ... in MODEL 2 and later */
-    uint64_t skipped_altlocs;    /* ... reserved for formats with alternate locations */
+    uint64_t lines;           /* lines read */
+    uint64_t atoms;           /* atoms in the molecule */
+    uint64_t zero_radius;     /* of these, with radius 0 */
+    uint64_t skipped;         /* records that hold an atom but were left out, and why: */
+    uint64_t skipped_models;  /* ... in MODEL 2 and later */
+    uint64_t skipped_altlocs; /* ... reserved for formats with alternate locations */
 } ovoid_molecule_counts;
 
 /* Reads a molecule; gzip is recognised by content; "-" is standard input. A bad line is
@@ -161,9 +161,10 @@ OVOID_API ovoid_molecule_counts ovoid_molecule_read_counts(const ovoid_molecule 
 /* ---- output files -------------------------------------------------------------------------- */
 
 /* A file that is whole or absent: its bytes go to a temporary file in the same folder, which takes
- * the final name at the end. Symbolic links are followed and stay, and a file that is replaced keeps
- * its permissions. "-" is standard output. What exists and is no regular file (a device, a FIFO) is
- * written in place. ovoid_model_write() writes this way; so can what goes beside a model. */
+ * the final name at the end. Symbolic links are followed and stay, and a file that is replaced
+ * keeps its permissions. "-" is standard output. What exists and is no regular file (a device, a
+ * FIFO) is written in place. ovoid_model_write() writes this way; so can what goes beside a model.
+ */
 typedef struct ovoid_file ovoid_file;
 
 /* OVOID_ERROR_IO if a file could not be written at `path` now, with the reason: no such folder, no
@@ -239,9 +240,9 @@ OVOID_API ovoid_status ovoid_model_annotate(ovoid_context *context, ovoid_model 
 OVOID_API ovoid_status ovoid_model_read(ovoid_context *context, const char *path,
                                         ovoid_model **model);
 
-/* Writes a model file: '#' header lines, a column line, one ellipsoid per line with nine significant
- * digits. "-" is standard output. A file is written beside its final place and renamed, so that
- * `path` never holds half a model. */
+/* Writes a model file: '#' header lines, a column line, one ellipsoid per line with nine
+ * significant digits. "-" is standard output. A file is written beside its final place and renamed,
+ * so that `path` never holds half a model. */
 OVOID_API ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model,
                                          const char *path);
 
@@ -258,13 +259,13 @@ typedef enum ovoid_method {
 
 /* What a progress callback sees after each iteration. */
 typedef struct ovoid_progress {
-    const char *stage;      /* "sample", "sparse" or "accuracy" */
-    uint64_t iteration;     /* 1 .. iterations; 0 while sampling */
-    uint64_t iterations;    /* how many there will be at most */
+    const char *stage;   /* "sample", "sparse" or "accuracy" */
+    uint64_t iteration;  /* 1 .. iterations; 0 while sampling */
+    uint64_t iterations; /* how many there will be at most */
     uint64_t ellipsoids;
     uint64_t points;
-    double accuracy_term;   /* E_s = sum_k (phi~ - phi)^2 over the constrained points */
-    double sparse_term;     /* E_l1 = sum_i |c_i| + |d_i1| + |d_i2| + |d_i3|, square-root variables */
+    double accuracy_term; /* E_s = sum_k (phi~ - phi)^2 over the constrained points */
+    double sparse_term;   /* E_l1 = sum_i |c_i| + |d_i1| + |d_i2| + |d_i3|, square-root variables */
     double accuracy_weight; /* w_s */
     double sparse_weight;   /* w_l */
     double objective;       /* w_s E_s + w_l E_l1 */
@@ -276,18 +277,27 @@ typedef struct ovoid_progress {
 /* Returns true to go on, false to stop with OVOID_ERROR_CANCELLED. */
 typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
 
+/* The step that the line search tries first (open in the paper, which asks for an inexact search
+ * along the negative gradient). */
+typedef enum ovoid_first_step {
+    OVOID_FIRST_STEP_SECANT = 0, /* Barzilai and Borwein's, where the last two gradients are of E_s
+                                    alone; else as GROW */
+    OVOID_FIRST_STEP_GROW        /* grow times the last accepted step */
+} ovoid_first_step;
+
 /* Constants of the paper's Algorithm 1. Those marked "open" are not given in the paper. */
 typedef struct ovoid_l1_options {
-    uint32_t iterations;        /* MaxNiter: 8000 (section 4.1, ADP) */
-    uint32_t sparse_iterations; /* SparseNiter: 6000 (section 4.1, ADP) */
-    double epsilon;             /* lower bound of w_s in step 5.4 (open) */
-    double max_error;           /* gate of step 5.5: 0.5 */
-    double prune_below;         /* tol of step 5.1: |c~| under it is deleted: 1e-3 */
-    uint32_t prune_every;       /* iterations between deletions: 20 */
-    double armijo;              /* sufficient decrease of the line search (open): 1e-4 */
-    double shrink;              /* factor of a rejected step (open): 0.5 */
-    double grow;                /* first step tried, over the last accepted one (open): 2 */
-    uint32_t max_backtracks;    /* trial steps of one search before giving up (open): 30 */
+    uint32_t iterations;         /* MaxNiter: 8000 (section 4.1, ADP) */
+    uint32_t sparse_iterations;  /* SparseNiter: 6000 (section 4.1, ADP) */
+    double epsilon;              /* lower bound of w_s in step 5.4 (open) */
+    double max_error;            /* gate of step 5.5: 0.5 */
+    double prune_below;          /* tol of step 5.1: |c~| under it is deleted: 1e-3 */
+    uint32_t prune_every;        /* iterations between deletions: 20 */
+    ovoid_first_step first_step; /* of the line search (open): SECANT */
+    double armijo;               /* sufficient decrease of the line search (open): 1e-4 */
+    double shrink;               /* factor of a rejected step (open): 0.5 */
+    double grow;                 /* of the last accepted step, for the next first one (open): 2 */
+    uint32_t max_backtracks;     /* trial steps of one search before giving up (open): 30 */
 } ovoid_l1_options;
 
 typedef struct ovoid_fit_options {
@@ -304,22 +314,22 @@ typedef struct ovoid_fit_options {
 /* Where the time of a fit went, and how much was done. The seconds are measured on the host between
  * waits for the device, so they include launches. */
 typedef struct ovoid_fit_profile {
-    double lists_seconds;    /* building the pack lists */
-    double field_seconds;    /* phi~ and the residual, including every trial step */
-    double moments_seconds;  /* sums for the gradient */
-    double host_seconds;     /* parameter updates and the chain rule */
+    double lists_seconds;   /* building the pack lists */
+    double field_seconds;   /* phi~ and the residual, including every trial step */
+    double moments_seconds; /* sums for the gradient */
+    double host_seconds;    /* parameter updates and the chain rule */
     uint64_t list_builds;
     uint64_t field_passes;
     uint64_t moments_passes;
-    uint64_t launches;       /* kernels enqueued */
+    uint64_t launches; /* kernels enqueued */
 } ovoid_fit_profile;
 
 typedef struct ovoid_fit_result {
-    uint64_t points;      /* constrained points */
+    uint64_t points; /* constrained points */
     uint64_t ellipsoids;
-    uint64_t iterations;  /* done */
-    double rms_error;     /* sqrt(E_s / points) */
-    double max_error;     /* max_k |phi~ - phi| over the constrained points */
+    uint64_t iterations; /* done */
+    double rms_error;    /* sqrt(E_s / points) */
+    double max_error;    /* max_k |phi~ - phi| over the constrained points */
     double sample_seconds;
     double fit_seconds;
     ovoid_fit_profile profile;

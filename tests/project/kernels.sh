@@ -1,0 +1,32 @@
+#!/bin/sh
+# kernels.sh FOLDER
+# Every program compiles without a warning in every shape, as OpenCL C 1.2 and without a device. A
+# program is shared.h, vector.clh and its own file, one after the other (host/device/program.c).
+set -u
+folder=$1
+for program in clang clang-15 clang-14; do
+    command -v "$program" >/dev/null && clang=$program && break
+done
+if [ -z "${clang:-}" ]; then
+    echo "skipped: clang is not installed"
+    exit 77
+fi
+status=0
+found=0
+for source in "$folder"/*.cl; do
+    found=$((found + 1))
+    for shape in 16x1 8x1 4x1 1x32; do
+        for file in shared.h vector.clh "$(basename "$source")"; do
+            printf '#line 1 "%s/%s"\n' "$folder" "$file"
+            cat "$folder/$file"
+        done | "$clang" -target spir64 -x cl -cl-std=CL1.2 -Xclang -finclude-default-header \
+            -fsyntax-only -Wall -Werror -DOV_PACK=32 -DOV_VECTOR="${shape%x*}" \
+            -DOV_LANES="${shape#*x}" - || {
+            echo "$source fails in shape $shape"
+            status=1
+        }
+    done
+done
+echo "$found programs in 4 shapes, with $clang"
+[ "$found" -gt 0 ] || status=1
+exit "$status"

@@ -9,13 +9,13 @@ void ovoid_fit_options_init(ovoid_fit_options *options) {
         .method = OVOID_METHOD_L1,
         .decay = OVOID_DEFAULT_DECAY,
         .isovalue = OVOID_DEFAULT_ISOVALUE,
-        .spacing = 1.0,
+        .spacing = 0.8,
         .padding = 2.0,
         .l1 =
             {
                 .iterations = 8000,
                 .sparse_iterations = 6000,
-                .epsilon = 0.01,
+                .epsilon = 0.05,
                 .max_error = 0.5,
                 .prune_below = 1e-3,
                 .prune_every = 20,

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""Ellipsoids of `ovoid fit --method l1` beside Table 1 of the paper, and where the time goes.
+
+    l1_counts.py --ovoid build/release/ovoid --molecules DIR [--names DIALA,ADP,1MAG,FAS2]
+                 [--sweep] [--output bench/results/l1_counts.csv]
+
+Fits every molecule of Table 1 that DIR holds as NAME.pqr (or NAME.pqr.gz) with the defaults, prints a
+table and writes a CSV. --sweep repeats it for several spacings and paddings. Fits run one after
+another; run nothing else beside them where the seconds matter.
+"""
+
+import argparse
+import csv
+import itertools
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+SPACINGS = (0.7, 0.8, 0.9, 1.0, 1.25)
+PADDINGS = (1.0, 1.5, 2.0, 3.0)
+COLUMNS = (
+    "molecule atoms ellipsoids paper sparse_ratio spacing padding points rms_error max_error "
+    "iterations seconds lists_seconds field_seconds moments_seconds host_seconds list_builds "
+    "field_passes moments_passes launches"
+).split()
+
+
+def paper_counts():
+    with open(os.path.join(HERE, "paper_table1.csv"), encoding="utf-8") as lines:
+        rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+        return {row["molecule"]: int(row["ellipsoids"]) for row in rows}
+
+
+def find(folder, name):
+    for extension in (".pqr", ".pqr.gz"):
+        path = os.path.join(folder, name + extension)
+        if os.path.exists(path):
+            return path
+    return None
+
+
+def fit(ovoid, path, options):
+    with tempfile.TemporaryDirectory() as folder:
+        report = os.path.join(folder, "report.json")
+        command = [ovoid, "fit", path, "--method", "l1", "--quiet", "--report", report]
+        command += ["-o", os.path.join(folder, "model.ovoid")] + options
+        subprocess.run(command, check=True)
+        with open(report, encoding="utf-8") as text:
+            return json.load(text)
+
+
+def row_of(name, report, paper):
+    row = {"molecule": name, "paper": paper, "seconds": report["seconds"]["fit"]}
+    for key in COLUMNS:
+        if key not in row:
+            value = report[key] if key in report else report["profile"][key]
+            row[key] = float(f"{value:.4g}") if isinstance(value, float) else value
+    return row
+
+
+def write(path, device, version, rows):
+    beside = path + ".part"
+    with open(beside, "w", encoding="utf-8", newline="") as out:
+        out.write(f"# ovoid {version}, {device}; bench/l1_counts.py\n")
+        table = csv.DictWriter(out, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+    os.replace(beside, path)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--ovoid", default="ovoid")
+    parser.add_argument("--molecules", required=True)
+    parser.add_argument("--names", default="DIALA,ADP,1MAG,FAS2")
+    parser.add_argument("--sweep", action="store_true")
+    parser.add_argument("--output")
+    arguments = parser.parse_args()
+
+    paper = paper_counts()
+    settings = [()]
+    if arguments.sweep:
+        settings = list(itertools.product(SPACINGS, PADDINGS))
+    rows, report = [], None
+    print(f"{'molecule':10}{'atoms':>7}{'spacing':>9}{'padding':>9}{'points':>9}"
+          f"{'ellipsoids':>12}{'paper':>7}{'rms':>9}{'largest':>9}{'seconds':>9}")
+    for setting in settings:
+        options = []
+        if setting:
+            options = ["--spacing", str(setting[0]), "--padding", str(setting[1])]
+        for name in arguments.names.split(","):
+            path = find(arguments.molecules, name)
+            if path is None or name not in paper:
+                sys.exit(f"l1_counts.py: no {name}.pqr in {arguments.molecules} or in Table 1")
+            report = fit(arguments.ovoid, path, options)
+            row = row_of(name, report, paper[name])
+            rows.append(row)
+            print(f"{name:10}{row['atoms']:7}{row['spacing']:9}{row['padding']:9}{row['points']:9}"
+                  f"{row['ellipsoids']:12}{row['paper']:7}{row['rms_error']:9.4f}"
+                  f"{row['max_error']:9.3f}{row['seconds']:9.1f}", flush=True)
+    if arguments.output:
+        write(arguments.output, report["device"], report["version"], rows)
+
+
+if __name__ == "__main__":
+    main()

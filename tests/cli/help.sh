@@ -1,0 +1,54 @@
+# Every help says what it should, on standard output, and succeeds.
+for command in "--help" "-h" "help"; do
+    run "$OVOID" $command
+    expect_code 0
+    expect_silent
+    for text in "Usage: ovoid COMMAND" "fit " "devices " "Exit codes:" "OVOID_DEVICE" "Examples:"; do
+        expect_out "$text"
+    done
+done
+
+for command in "fit --help" "fit -h" "help fit" "fit molecule.pqr --decay 1 --help"; do
+    run "$OVOID" $command
+    expect_code 0
+    expect_silent
+    for text in "Usage: ovoid fit MOLECULE" "Exit codes:" "Examples:" "OVOID_DEVICE" "(default 0.5 Å⁻²)"; do
+        expect_out "$text"
+    done
+    for option in output report trace format device method quiet help decay isovalue spacing padding \
+        iterations sparse-iterations epsilon max-error prune-below prune-every armijo shrink grow \
+        max-backtracks; do
+        expect_out "--$option"
+    done
+done
+
+for command in "devices --help" "devices -h" "help devices"; do
+    run "$OVOID" $command
+    expect_code 0
+    expect_silent
+    expect_out "Usage: ovoid devices"
+    expect_out "--json"
+done
+
+run "$OVOID" --version
+expect_code 0
+expect_silent
+grep -qE '^ovoid [0-9]+\.[0-9]+\.[0-9]+$' "$out" || fail "a version was expected"
+
+# Without a command the help is an error.
+run "$OVOID"
+expect_code 2
+expect_no_out
+expect_err "Usage: ovoid COMMAND"
+
+# Nobody reads a help that could not be written.
+if [ -w /dev/full ]; then
+    "$OVOID" fit --help >/dev/full 2>"$err"
+    code=$?
+    expect_code 4
+    expect_err "cannot write standard output: No space left on device"
+fi
+"$OVOID" --version >&- 2>"$err"
+code=$?
+expect_code 4
+expect_err "cannot write standard output"

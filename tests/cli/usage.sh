@@ -1,0 +1,65 @@
+# Wrong options: exit code 2, an error that names the option, nothing written.
+make_helix 6 a.xyzr
+
+wrong() {
+    text=$1
+    shift
+    run "$OVOID" "$@"
+    expect_code 2
+    expect_no_out
+    expect_err "ovoid: error: "
+    expect_err "$text"
+    expect_files a.xyzr
+}
+
+wrong "no command 'fitt'; did you mean 'fit'?" fitt
+wrong "did you mean 'devices'?" devcies
+wrong "no command 'zzz' (" zzz
+wrong "no command 'fi'" help fi
+wrong "no option '--foo' before a command" --foo
+wrong "which molecule?" fit
+wrong "one molecule at a time, but 'b' follows 'a.xyzr'" fit a.xyzr b
+wrong "did you mean '--iterations'?" fit a.xyzr --iteratoins 3
+wrong "no option '--zzzzzz' (" fit a.xyzr --zzzzzz
+wrong "no option -x" fit a.xyzr -x
+wrong "--decay needs a value" fit a.xyzr --decay
+wrong "-o needs a value" fit a.xyzr -o
+wrong "--quiet=yes: this option takes no value" fit a.xyzr --quiet=yes
+wrong "'ovoid devices' takes no 'x'" devices x
+wrong "no option '--jsn'; did you mean '--json'?" devices --jsn
+
+for option in decay isovalue spacing padding epsilon max-error prune-below armijo shrink grow; do
+    wrong "--$option takes a number, not 'x'" fit a.xyzr "--$option" x
+    wrong "--$option takes a number, not ''" fit a.xyzr "--$option" ""
+    wrong "--$option takes a number, not 'nan'" fit a.xyzr "--$option" nan
+    wrong "--$option takes a number, not '0x1'" fit a.xyzr "--$option" 0x1
+    wrong "--$option takes a number, not '1 '" fit a.xyzr "--$option" "1 "
+    wrong "--$option is -1, but must be" fit a.xyzr "--$option" -1
+    wrong "--$option is 1e999, but must be" fit a.xyzr "--$option" 1e999
+done
+for option in iterations sparse-iterations prune-every max-backtracks; do
+    wrong "--$option takes a whole number, not 'x'" fit a.xyzr "--$option" x
+    wrong "--$option takes a whole number, not '1.5'" fit a.xyzr "--$option" 1.5
+    wrong "--$option is -1, but must be at least" fit a.xyzr "--$option" -1
+    wrong "--$option is 9999999999, but must be at most" fit a.xyzr "--$option" 9999999999
+done
+wrong "--decay is 0, but must be above 0 Å⁻²" fit a.xyzr --decay 0
+wrong "--armijo is 1, but must be at most 0.999" fit a.xyzr --armijo 1
+wrong "--grow is 0.5, but must be at least 1" fit a.xyzr --grow 0.5
+wrong "--iterations is 0, but must be at least 1" fit a.xyzr --iterations 0
+wrong "--sparse-iterations is 20, but there are only 10" fit a.xyzr --iterations 10 \
+    --sparse-iterations 20
+wrong "--method takes l1, not 'best'" fit a.xyzr --method best
+wrong "--format takes pqr or xyzr, not 'pdb'" fit a.xyzr --format pdb
+
+# Outputs that would fall on each other or on the input.
+wrong "the molecule and the model (-o) are the same file" fit a.xyzr -o a.xyzr
+wrong "the molecule and the report (--report) are the same file" fit a.xyzr --report ./a.xyzr
+wrong "the report (--report) and the trace (--trace) are the same file" fit a.xyzr --report x \
+    --trace ../work/x
+wrong "cannot both go to standard output" fit a.xyzr -o - --trace -
+wrong "name the model's file with -o" fit -
+ln a.xyzr b.xyzr
+run "$OVOID" fit a.xyzr -o b.xyzr
+expect_code 2
+expect_err "are the same file"

@@ -86,9 +86,14 @@ const char *cli_nearest(const char *text, const char *const *names);
 
 /* ---- interrupt.c ---------------------------------------------------------------------------- */
 
-/* From now on the first SIGINT, SIGTERM or SIGHUP only raises a flag, a second one kills. Signals
- * ignored by whoever started the program stay ignored. SIGPIPE becomes a write error. */
+/* From now on SIGINT, SIGTERM and SIGHUP say so and end the program with 128 + their number.
+ * Signals ignored by whoever started the program stay ignored. A closed pipe and a file over the
+ * size limit become write errors. */
 void cli_catch_signals(void);
+
+/* From now on, with work under way that has to be stopped in order, the first signal only raises a
+ * flag, and a second one kills. */
+void cli_defer_signals(void);
 
 /* Number of the signal that came, 0 for none. */
 int cli_interrupted(void);

@@ -33,13 +33,9 @@ static ovoid_status check_outputs(const fit_job *job) {
     return OVOID_OK;
 }
 
-/* Adds a header line to the model, unless the library has said it already. Line breaks and the
- * like, which a file name may hold, become '?'. */
+/* Adds a header line to the model. Line breaks and the like, which a file name may hold, become
+ * '?'. */
 static ovoid_status annotate(const fit_job *job, const char *key, const char *text) {
-    const char *note;
-    for (size_t i = 0; (note = ovoid_model_note(job->model, i)) != NULL; i++)
-        if (strncmp(note, key, strlen(key)) == 0 && note[strlen(key)] == ':')
-            return OVOID_OK;
     char *clean = strdup(text);
     if (!clean)
         return OVOID_ERROR_MEMORY;
@@ -65,11 +61,9 @@ static void print_settings(const fit_job *job, char *text, size_t size) {
 static ovoid_status annotate_all(const fit_job *job) {
     const ovoid_device_info *device = ovoid_context_device(job->context);
     char text[1024];
-    ovoid_status status = annotate(job, "input", job->input);
-    if (status != OVOID_OK)
-        return status;
     snprintf(text, sizeof text, "ovoid %s", ovoid_version());
-    if ((status = annotate(job, "program", text)) != OVOID_OK)
+    ovoid_status status = annotate(job, "program", text);
+    if (status != OVOID_OK || (status = annotate(job, "input", job->input)) != OVOID_OK)
         return status;
     snprintf(text, sizeof text, "%s (%s, driver %s)", device->name, device->platform,
              device->driver);
@@ -96,6 +90,7 @@ static ovoid_status open_device(fit_job *job) {
 
 static ovoid_status fit(fit_job *job) {
     ovoid_status status = OVOID_OK;
+    cli_defer_signals();
     if (job->trace)
         status = fit_trace_open(&job->tracer, job->context, job->trace);
     if (status != OVOID_OK)

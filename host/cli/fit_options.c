@@ -6,41 +6,41 @@
 
 #define REAL(name, member, low, above, high, below, unit, help)                                    \
     { name, CLI_REAL, offsetof(ovoid_fit_options, member), low, high, above, below, unit, help }
-#define COUNT(name, member, low, help)                                                             \
-    {                                                                                              \
-        name, CLI_COUNT, offsetof(ovoid_fit_options, member), low, UINT32_MAX, false, false, "",   \
-            help                                                                                   \
-    }
+#define COUNT(name, member, low, high, help)                                                       \
+    { name, CLI_COUNT, offsetof(ovoid_fit_options, member), low, high, false, false, "", help }
 
+/* The ranges are the library's, so that a value out of range is met before any work. */
 const cli_number fit_surface_numbers[] = {
-    REAL("decay", decay, 0, true, INFINITY, true, "Å⁻²",
+    REAL("decay", decay, 0, true, 100, false, "Å⁻²",
          "decay rate d of the atoms' Gaussians: larger is closer to the atoms"),
-    REAL("isovalue", isovalue, 0, true, INFINITY, true, "",
+    REAL("isovalue", isovalue, 0, true, 1e6, false, "",
          "the surface is where the field has this value c"),
-    REAL("spacing", spacing, 0, true, INFINITY, true, "Å",
+    REAL("spacing", spacing, 0, true, 1e3, false, "Å",
          "distance of the points where the fields are compared"),
-    REAL("padding", padding, 0, false, INFINITY, true, "Å",
+    REAL("padding", padding, 0, false, 1e3, false, "Å",
          "room for points about the outermost atom centres"),
 };
 const size_t fit_surface_count = sizeof fit_surface_numbers / sizeof *fit_surface_numbers;
 
 const cli_number fit_l1_numbers[] = {
-    COUNT("iterations", l1.iterations, 1, "iterations in all: MaxNiter"),
-    COUNT("sparse-iterations", l1.sparse_iterations, 0,
+    COUNT("iterations", l1.iterations, 1, UINT32_MAX, "iterations at most: MaxNiter"),
+    COUNT("sparse-iterations", l1.sparse_iterations, 0, UINT32_MAX,
           "of these, iterations that also make the model sparse: SparseNiter"),
-    REAL("epsilon", l1.epsilon, 0, false, INFINITY, true, "",
+    REAL("epsilon", l1.epsilon, 0, true, 1, false, "",
          "smallest weight of the accuracy term in step 5.4"),
     REAL("max-error", l1.max_error, 0, true, INFINITY, true, "",
          "sparsity has to wait while an error is above this, step 5.5"),
-    REAL("prune-below", l1.prune_below, 0, false, INFINITY, true, "",
+    REAL("prune-below", l1.prune_below, 0, false, 1e3, false, "",
          "ellipsoids are deleted when the root of their amplitude is below this"),
-    COUNT("prune-every", l1.prune_every, 1, "iterations from one deletion to the next"),
-    REAL("armijo", l1.armijo, 0, true, 1, true, "",
+    COUNT("prune-every", l1.prune_every, 1, UINT32_MAX, "iterations from one deletion to the next"),
+    REAL("armijo", l1.armijo, 0, true, 0.999, false, "",
          "line search: share of the predicted decrease that a step must reach"),
-    REAL("shrink", l1.shrink, 0, true, 1, true, "", "line search: factor after a rejected step"),
-    REAL("grow", l1.grow, 1, false, INFINITY, true, "",
+    REAL("shrink", l1.shrink, 0, true, 0.999, false, "",
+         "line search: factor after a rejected step"),
+    REAL("grow", l1.grow, 1, false, 1e6, false, "",
          "line search: first step tried, over the last accepted one"),
-    COUNT("max-backtracks", l1.max_backtracks, 1, "line search: rejected steps before giving up"),
+    COUNT("max-backtracks", l1.max_backtracks, 1, 1000,
+          "line search: rejected steps before giving up"),
 };
 const size_t fit_l1_count = sizeof fit_l1_numbers / sizeof *fit_l1_numbers;
 

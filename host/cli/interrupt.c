@@ -3,10 +3,15 @@
 #include <signal.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t caught;
+static volatile sig_atomic_t caught, deferred;
 static const char *volatile doomed; /* file to remove when killed */
 
 static void on_signal(int number) {
+    static const char text[] = "ovoid: error: interrupted\n";
+    if (!deferred) {
+        (void)!write(STDERR_FILENO, text, sizeof text - 1);
+        _exit(128 + number);
+    }
     if (!caught) {
         caught = number;
         return;
@@ -23,12 +28,18 @@ void cli_catch_signals(void) {
         struct sigaction action;
         if (sigaction(numbers[i], NULL, &action) != 0 || action.sa_handler == SIG_IGN)
             continue;
-        /* Without SA_RESTART: a read from a terminal or pipe that waits is to end. */
-        action = (struct sigaction){.sa_handler = on_signal};
+        action = (struct sigaction){.sa_handler = on_signal, .sa_flags = SA_RESTART};
         sigemptyset(&action.sa_mask);
         sigaction(numbers[i], &action, NULL);
     }
     signal(SIGPIPE, SIG_IGN);
+#ifdef SIGXFSZ
+    signal(SIGXFSZ, SIG_IGN);
+#endif
+}
+
+void cli_defer_signals(void) {
+    deferred = 1;
 }
 
 int cli_interrupted(void) {

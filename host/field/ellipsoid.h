@@ -24,6 +24,9 @@ void ov_quadratic_form(double r[3][3], const double decay[3], double a[6]);
 
 void ov_quadric_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_quadric *quadric);
 
+/* Largest d r^2 of an atom: up to here its exp(d r^2), and sums of many, fit a float. */
+#define OV_EXPONENT_MAX 80.0
+
 /* The Gaussian of an atom: exp(-d (|x - x_i|^2 - r^2)); xyzr in angstrom, d in angstrom^-2. */
 void ov_quadric_of_atom(const double xyzr[4], double d, ov_quadric *quadric);
 

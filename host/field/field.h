@@ -47,6 +47,9 @@ ovoid_status ov_sort_keys(ovoid_context *context, const uint64_t *keys, size_t c
 ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t count, ov_tree *tree,
                            float **boxes, size_t *floats);
 
+/* OVOID_ERROR_LIMIT when an atom's exp(d r^2) is too large for the kernels' floats. */
+ovoid_status ov_atoms_check(ovoid_context *context, const double *xyzr, size_t atoms, double decay);
+
 /* ---- terms -------------------------------------------------------------------------------- */
 
 typedef struct ov_terms {

@@ -23,6 +23,10 @@ typedef struct piece_grid {
     uint32_t *atom;
 } piece_grid;
 
+/* Bytes on the device per constrained point: coordinates, phi, its gradient, and what a fit adds.
+ */
+#define BYTES_PER_POINT 100
+
 typedef struct sampler {
     const double *xyzr;
     size_t atoms;
@@ -41,6 +45,7 @@ typedef struct sampler {
     size_t quadrics_capacity;
     float *kept;                      /* x, y, z relative to origin */
     size_t kept_count, kept_capacity; /* capacity in floats */
+    uint64_t kept_limit;
 } sampler;
 
 ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_t atoms,
@@ -211,6 +216,41 @@ cleanup:
     return status;
 }
 
+/* A band that reaches down to 0 holds all of space outside the molecule: say so before memory ends.
+ */
+static ovoid_status check_room(ovoid_context *context, const sampler *s, uint64_t points) {
+    if (points <= s->kept_limit)
+        return OVOID_OK;
+    return ov_fail(context, OVOID_ERROR_LIMIT,
+                   "at least %llu constrained points, and the device has memory for %llu; use a "
+                   "larger spacing or a smaller padding",
+                   (unsigned long long)points, (unsigned long long)s->kept_limit);
+}
+
+/* Points on the lattice within the piece of this number. */
+static uint64_t points_in_piece(const sampler *s, uint64_t piece) {
+    uint64_t points = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        const uint64_t first = piece % s->pieces.count[axis] * s->pieces.size[axis];
+        const uint64_t left = s->lattice->size[axis] - first;
+        points *= left < s->pieces.size[axis] ? left : s->pieces.size[axis];
+        piece /= s->pieces.count[axis];
+    }
+    return points;
+}
+
+/* Pieces without atoms are kept whole or not at all, which bounds the count before any is
+ * evaluated. */
+static ovoid_status check_empty_pieces(ovoid_context *context, const sampler *s) {
+    uint64_t points = 0;
+    if (s->band.low > 0.0)
+        return OVOID_OK;
+    for (uint64_t p = 0; p < s->pieces.total; ++p)
+        if (s->pieces.start[p] == s->pieces.start[p + 1])
+            points += points_in_piece(s, p);
+    return check_room(context, s, points);
+}
+
 /* Appends the piece's points that lie on the lattice and in the band. */
 static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t at[3]) {
     const uint64_t *const size = s->pieces.size;
@@ -237,7 +277,7 @@ static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t
                 (float)(coordinate(s->lattice, axis, index[axis]) - s->origin[axis]);
         ++s->kept_count;
     }
-    return OVOID_OK;
+    return check_room(context, s, s->kept_count);
 }
 
 static ovoid_status sample_pieces(ovoid_context *context, sampler *s) {
@@ -298,12 +338,16 @@ ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms,
                        const ov_lattice *lattice, ov_band band, ov_samples *samples) {
     ovoid_status status = OVOID_OK;
     ov_samples made = {0};
+    ov_device *device;
     sampler s = {.xyzr = xyzr, .atoms = atoms, .decay = decay, .lattice = lattice, .band = band};
     for (size_t axis = 0; axis < 3; ++axis)
         s.origin[axis] =
             lattice->low[axis] + 0.5 * lattice->step[axis] * (double)lattice->size[axis];
+    OV_TRY(ov_device_get(context, &device));
+    s.kept_limit = device->info.global_memory / BYTES_PER_POINT;
     plan_pieces(lattice, &s.pieces);
     OV_TRY(bin_atoms(context, &s));
+    OV_TRY(check_empty_pieces(context, &s));
     OV_TRY(lay_piece(context, &s));
     OV_TRY(sample_pieces(context, &s));
     OV_TRY(finish_samples(context, &s, &made));

@@ -6,12 +6,32 @@
 
 #define LOG2_E 1.4426950408889634
 
+ovoid_status ov_atoms_check(ovoid_context *context, const double *xyzr, size_t atoms,
+                            double decay) {
+    for (size_t i = 0; i < atoms; ++i) {
+        const double radius = xyzr[4 * i + 3];
+        if (decay * radius * radius > OV_EXPONENT_MAX)
+            return ov_fail(context, OVOID_ERROR_LIMIT,
+                           "atom %zu: a radius of %g angstrom is too large for a decay of %g; the "
+                           "largest is %.4g angstrom",
+                           i + 1, radius, decay, sqrt(OV_EXPONENT_MAX / decay));
+    }
+    return OVOID_OK;
+}
+
+/* Largest amplitude that the kernels' 2^t holds, as a power of two. */
+#define LOG2_AMPLITUDE_MAX 127.0
+
+/* Up to rounding: the minors of long needles and pancakes are differences of far larger products.
+ */
 static bool is_positive_definite(const double a[6]) {
     const double minor = a[0] * a[3] - a[1] * a[1];
     const double determinant = a[0] * (a[3] * a[5] - a[4] * a[4]) -
                                a[1] * (a[1] * a[5] - a[4] * a[2]) +
                                a[2] * (a[1] * a[4] - a[3] * a[2]);
-    return a[0] > 0.0 && minor > 0.0 && determinant > 0.0;
+    const double trace = a[0] + a[3] + a[5], rounding = 1e-14 * trace * trace;
+    return a[0] > 0.0 && a[3] > 0.0 && a[5] > 0.0 && minor > -rounding &&
+           determinant > -rounding * trace;
 }
 
 /* q's off-diagonal coefficients are doubled here, once, instead of per pair in the kernels. */
@@ -33,7 +53,8 @@ static bool to_term(const ov_quadric *quadric, const double origin[3], double lo
     };
     const float sum = term->x + term->y + term->z + term->xx + term->xy + term->xz + term->yy +
                       term->yz + term->zz;
-    return isfinite(sum) && isfinite(log2_amplitude) && is_positive_definite(quadric->a);
+    return isfinite(sum) && isfinite(log2_amplitude) && log2_amplitude <= LOG2_AMPLITUDE_MAX &&
+           is_positive_definite(quadric->a);
 }
 
 ovoid_status ov_terms_set(ovoid_context *context, ov_terms *terms, const ov_quadric *quadrics,

@@ -1,5 +1,6 @@
 /* The public functions that evaluate a molecule's or a model's field. */
 #include "field/evaluate.h"
+#include "field/field.h"
 #include "fit/model.h"
 
 #include <stdlib.h>
@@ -14,6 +15,9 @@ ovoid_status ovoid_molecule_field(ovoid_context *context, const ovoid_molecule *
                        decay);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
+    const ovoid_status checked = ov_atoms_check(context, xyzr, atoms, decay);
+    if (checked != OVOID_OK)
+        return checked;
     ov_quadric *const quadrics = ov_alloc(context, atoms, sizeof *quadrics, "atoms");
     if (!quadrics)
         return OVOID_ERROR_MEMORY;

@@ -38,6 +38,7 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const double began = ov_seconds();
     OV_TRY(ov_fit_options_check(context, options));
+    OV_TRY(ov_atoms_check(context, ovoid_molecule_xyzr(molecule), atoms, options->decay));
     OV_TRY(ov_device_get(context, &device));
     if (!report_sampling(options, atoms)) {
         status = ov_fail(context, OVOID_ERROR_CANCELLED, "stopped before sampling");

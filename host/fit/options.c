@@ -10,7 +10,7 @@ void ovoid_fit_options_init(ovoid_fit_options *options) {
         .decay = OVOID_DEFAULT_DECAY,
         .isovalue = OVOID_DEFAULT_ISOVALUE,
         .spacing = 0.8,
-        .padding = 2.0,
+        .padding = 3.0,
         .l1 =
             {
                 .iterations = 8000,

@@ -1,0 +1,58 @@
+/*
+ * Plain C, double precision: what the kernels compute, written as the formulas are. Sums run over
+ * all terms and all points; lists, packs and cut-offs do not exist here.
+ */
+#ifndef REFERENCE_H
+#define REFERENCE_H
+
+#include "field/field.h"
+
+/* A sum with its conditioning: scale is the sum of the magnitudes of its parts, each multiplied by
+ * how much its exponent magnifies a relative rounding error. Single precision can be held to a
+ * small multiple of FLT_EPSILON * scale, whatever the model. */
+typedef struct reference_sum {
+    double value;
+    double scale;
+} reference_sum;
+
+/* R_z(angle[2]) R_y(angle[1]) R_x(angle[0]) as a product of the paper's three matrices. */
+void reference_rotation(const double angle[3], double r[3][3]);
+
+/* The paper's ellipsoid Gaussian itself: a exp(-|D^(1/2) R (y - mu)|^2), with no A in between. */
+double reference_ellipsoid(const ovoid_ellipsoid *ellipsoid, const double y[3]);
+
+/* q = (y - mu)^T A (y - mu). */
+double reference_exponent(const ov_quadric *quadric, const double y[3]);
+
+/* 1, x, y, z, xx, xy, xz, yy, yz, zz. */
+void reference_monomials(const double z[3], double m[OV_MONOMIALS]);
+
+reference_sum reference_field(const ov_quadric *quadrics, size_t count, const double y[3]);
+
+/* polynomial: OV_MONOMIALS coefficients per term. */
+reference_sum reference_field_polynomial(const ov_quadric *quadrics, const float *polynomial,
+                                         size_t count, const double y[3]);
+
+void reference_gradient(const ov_quadric *quadrics, size_t count, const double y[3],
+                        reference_sum gradient[3]);
+
+/* sum_k u_k e(y_k) m(y_k - mu); xyz: 3 per point. */
+void reference_moments(const ov_quadric *quadric, const double *xyz, const double *u, size_t count,
+                       reference_sum moments[OV_MONOMIALS]);
+
+/* Least q of a term over a box (low x, y, z, high x, y, z), exactly: the minimum lies inside, on a
+ * face, an edge or a corner, and all 27 are tried. */
+double reference_least_exponent(const ov_quadric *quadric, const double box[6]);
+
+/* phi of the paper's eq. 1.1. */
+double reference_phi(const double *xyzr, size_t atoms, double decay, const double y[3]);
+
+/* sum_k (phi~(y_k) - target_k)^2 for the paper's parameters, ten per ellipsoid in the order of
+ * fit/chain.h. */
+double reference_accuracy(const double *parameters, size_t ellipsoids, const double *xyz,
+                          const double *target, size_t points);
+
+/* sum |c| + |d_1| + |d_2| + |d_3|. */
+double reference_sparsity(const double *parameters, size_t ellipsoids);
+
+#endif

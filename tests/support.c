@@ -1,0 +1,187 @@
+#include "support.h"
+
+bool test_small(void) {
+    const char *const text = getenv("OVOID_TEST_SMALL");
+    return text && strcmp(text, "1") == 0;
+}
+
+size_t test_size(size_t full, size_t small) {
+    return test_small() ? small : full;
+}
+
+void test_check(ovoid_context *context, ovoid_status status) {
+    if (status != OVOID_OK)
+        fail_msg("%s: %s", ovoid_status_name(status), ovoid_context_error(context));
+}
+
+void test_refused(ovoid_context *context, ovoid_status status, ovoid_status wanted,
+                  const char *part) {
+    if (status != wanted)
+        fail_msg("status %s instead of %s (%s)", ovoid_status_name(status),
+                 ovoid_status_name(wanted), ovoid_context_error(context));
+    if (!strstr(ovoid_context_error(context), part))
+        fail_msg("\"%s\" is missing in \"%s\"", part, ovoid_context_error(context));
+}
+
+int test_open(void **state) {
+    ovoid_context *context = NULL;
+    if (ovoid_context_create(&context) != OVOID_OK)
+        return -1;
+    if (ovoid_context_open_device(context, NULL) != OVOID_OK) {
+        fprintf(stderr, "%s\n", ovoid_context_error(context));
+        ovoid_context_destroy(&context);
+        return -1;
+    }
+    *state = context;
+    return 0;
+}
+
+int test_close(void **state) {
+    ovoid_context *context = *state;
+    ovoid_context_destroy(&context);
+    return 0;
+}
+
+void *test_alloc(size_t count, size_t size) {
+    void *const memory = calloc(count > 0 ? count : 1, size);
+    if (!memory)
+        abort();
+    return memory;
+}
+
+/* ---- random numbers ----------------------------------------------------------------------- */
+
+uint64_t random_bits(test_random *random) {
+    uint64_t z = random->state += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+double random_uniform(test_random *random, double low, double high) {
+    return low + (high - low) * ldexp((double)(random_bits(random) >> 11), -53);
+}
+
+/* ---- models ------------------------------------------------------------------------------- */
+
+#define PI 3.14159265358979323846
+
+const char *model_kind_name(model_kind kind) {
+    static const char *const names[MODEL_KINDS] = {"random", "needle", "pancake", "sphere",
+                                                   "gimbal", "huge",   "tiny"};
+    return names[kind];
+}
+
+void random_ellipsoids(test_random *random, model_kind kind, double half,
+                       ovoid_ellipsoid *ellipsoids, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        ovoid_ellipsoid *const e = &ellipsoids[i];
+        e->amplitude = exp(random_uniform(random, -1.0, 2.0));
+        for (int k = 0; k < 3; ++k) {
+            e->decay[k] = exp(random_uniform(random, -2.0, 0.5));
+            e->centre[k] = (float)random_uniform(random, -half, half);
+            e->angle[k] = random_uniform(random, -PI, PI);
+        }
+        if (kind == MODEL_NEEDLE || kind == MODEL_PANCAKE) {
+            e->decay[0] = e->decay[1] = kind == MODEL_NEEDLE ? 4.0 : 4e-4;
+            e->decay[2] = kind == MODEL_NEEDLE ? 4e-4 : 4.0;
+        } else if (kind == MODEL_SPHERE) {
+            e->decay[1] = e->decay[2] = e->decay[0];
+        } else if (kind == MODEL_GIMBAL) {
+            e->angle[1] = i % 2 ? 0.5 * PI : -0.5 * PI;
+        } else if (kind == MODEL_HUGE) {
+            e->amplitude = exp(random_uniform(random, 20.0, 40.0));
+        } else if (kind == MODEL_TINY) {
+            e->amplitude = exp(random_uniform(random, -18.0, -10.0));
+        }
+    }
+}
+
+/* ---- a model on the device ---------------------------------------------------------------- */
+
+void bench_create(bench *b, ovoid_context *context, const ov_quadric *quadrics, size_t terms_count,
+                  const float *xyz, size_t count, double cutoff) {
+    const double origin[3] = {0};
+    memset(b, 0, sizeof *b);
+    b->context = context;
+    b->terms_count = terms_count;
+    b->count = count;
+    b->quadrics = test_alloc(terms_count, sizeof *quadrics);
+    if (terms_count > 0)
+        memcpy(b->quadrics, quadrics, terms_count * sizeof *quadrics);
+    test_check(context, ov_points_create(context, xyz, count, origin, 0.5, &b->points));
+    b->xyz = test_alloc(3 * count, sizeof *b->xyz);
+    for (size_t k = 0; k < count; ++k)
+        for (size_t axis = 0; axis < 3; ++axis)
+            b->xyz[3 * k + axis] = xyz[3 * (size_t)b->points.order[k] + axis];
+    test_check(context, ov_terms_set(context, &b->terms, quadrics, terms_count, origin, cutoff));
+    test_check(context, ov_lists_build(context, &b->lists, &b->points, &b->terms, 0.0));
+}
+
+void bench_destroy(bench *b) {
+    ov_points_destroy(&b->points);
+    ov_terms_destroy(&b->terms);
+    ov_lists_destroy(&b->lists);
+    ov_operations_destroy(&b->operations);
+    free(b->quadrics);
+    free(b->xyz);
+    memset(b, 0, sizeof *b);
+}
+
+float *random_points(test_random *random, size_t count, double half) {
+    float *const xyz = test_alloc(3 * count, sizeof *xyz);
+    for (size_t k = 0; k < 3 * count; ++k)
+        xyz[k] = (float)random_uniform(random, -half, half);
+    return xyz;
+}
+
+void bench_random(bench *b, ovoid_context *context, model_kind kind, size_t terms_count,
+                  size_t count, uint64_t seed) {
+    test_random random = {seed};
+    ovoid_ellipsoid *const ellipsoids = test_alloc(terms_count, sizeof *ellipsoids);
+    ov_quadric *const quadrics = test_alloc(terms_count, sizeof *quadrics);
+    random_ellipsoids(&random, kind, 4.0, ellipsoids, terms_count);
+    for (size_t i = 0; i < terms_count; ++i)
+        ov_quadric_of_ellipsoid(&ellipsoids[i], &quadrics[i]);
+    float *const xyz = random_points(&random, count, 6.0);
+    bench_create(b, context, quadrics, terms_count, xyz, count, 1e-37);
+    free(xyz);
+    free(quadrics);
+    free(ellipsoids);
+}
+
+float *read_floats(ovoid_context *context, const ov_buffer *buffer, size_t count) {
+    float *const values = test_alloc(count, sizeof *values);
+    test_check(context, ov_buffer_read(context, buffer, 0, values, count * sizeof *values));
+    return values;
+}
+
+uint32_t *read_indices(ovoid_context *context, const ov_buffer *buffer, size_t count) {
+    uint32_t *const values = test_alloc(count, sizeof *values);
+    test_check(context, ov_buffer_read(context, buffer, 0, values, count * sizeof *values));
+    return values;
+}
+
+void write_floats(ovoid_context *context, ov_buffer *buffer, const float *values, size_t count) {
+    test_check(context, ov_buffer_reserve(context, buffer, count * sizeof *values, "test values"));
+    test_check(context, ov_buffer_write(context, buffer, 0, values, count * sizeof *values));
+}
+
+/* ---- comparison --------------------------------------------------------------------------- */
+
+void expect_close(double got, reference_sum wanted, double tolerance, double *worst,
+                  const char *what, size_t index) {
+    const double unit = FLT_EPSILON * wanted.scale;
+    const double error = fabs(got - wanted.value);
+    if (!(error <= tolerance * unit + 1e-30))
+        fail_msg("%s %zu is %.9g instead of %.9g, off by %.3g where %.3g is allowed", what, index,
+                 got, wanted.value, error, tolerance * unit);
+    if (worst && unit > 1e-30)
+        *worst = fmax(*worst, error / unit);
+}
+
+void expect_near(double got, double wanted, double tolerance, const char *what) {
+    if (!(fabs(got - wanted) <= tolerance))
+        fail_msg("%s is %.12g instead of %.12g, off by %.3g where %.3g is allowed", what, got,
+                 wanted, fabs(got - wanted), tolerance);
+}

@@ -1,0 +1,113 @@
+/*
+ * What the tests of fields and fits share: a context with the device, reproducible random numbers,
+ * models of every shape that is known to be difficult, points, and comparisons.
+ */
+#ifndef SUPPORT_H
+#define SUPPORT_H
+
+#include "field/field.h"
+#include "reference/reference.h"
+
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* True under OVOID_TEST_SMALL=1: sizes for devices that are simulated. */
+bool test_small(void);
+
+/* `full`, or `small` in small mode. */
+size_t test_size(size_t full, size_t small);
+
+/* Fails the test with the context's message unless status is OVOID_OK. */
+void test_check(ovoid_context *context, ovoid_status status);
+/* Fails unless status is `wanted` and the message contains `part`. */
+void test_refused(ovoid_context *context, ovoid_status status, ovoid_status wanted,
+                  const char *part);
+
+/* Group fixtures: *state is a context with the device opened. */
+int test_open(void **state);
+int test_close(void **state);
+
+/* Allocates or aborts; free with free(). Zeroed. */
+void *test_alloc(size_t count, size_t size);
+
+/* ---- random numbers (splitmix64) ---------------------------------------------------------- */
+
+typedef struct test_random {
+    uint64_t state;
+} test_random;
+
+uint64_t random_bits(test_random *random);
+double random_uniform(test_random *random, double low, double high);
+
+/* ---- models ------------------------------------------------------------------------------- */
+
+typedef enum model_kind {
+    MODEL_RANDOM,  /* moderately long ellipsoids */
+    MODEL_NEEDLE,  /* one axis a hundred times as long as the others */
+    MODEL_PANCAKE, /* one axis a hundred times as short as the others */
+    MODEL_SPHERE,  /* D proportional to I */
+    MODEL_GIMBAL,  /* beta = +-pi/2 */
+    MODEL_HUGE,    /* amplitudes up to e^40 */
+    MODEL_TINY,    /* amplitudes down to 1e-8 */
+    MODEL_KINDS
+} model_kind;
+
+const char *model_kind_name(model_kind kind);
+
+/* Ellipsoids with centres in the cube of this half-length, at float positions, so that moving them
+ * to the device does not round. */
+void random_ellipsoids(test_random *random, model_kind kind, double half,
+                       ovoid_ellipsoid *ellipsoids, size_t count);
+
+/* ---- a model on the device ---------------------------------------------------------------- */
+
+/* Points, terms and lists of one test. */
+typedef struct bench {
+    ovoid_context *context;
+    ov_quadric *quadrics;
+    size_t terms_count, count;
+    double *xyz; /* of the points in pack order, 3 per point */
+    ov_points points;
+    ov_terms terms;
+    ov_lists lists;
+    ov_operations operations;
+} bench;
+
+/* Puts `count` points (3 floats each) and the terms on the device, lists included; origin 0. */
+void bench_create(bench *b, ovoid_context *context, const ov_quadric *quadrics, size_t terms_count,
+                  const float *xyz, size_t count, double cutoff);
+void bench_destroy(bench *b);
+
+/* Random points in the cube of this half-length. */
+float *random_points(test_random *random, size_t count, double half);
+
+/* Random ellipsoids of the kind with random points about them, every pair in the lists: the cut-off
+ * is far below single precision. */
+void bench_random(bench *b, ovoid_context *context, model_kind kind, size_t terms_count,
+                  size_t count, uint64_t seed);
+
+/* The first `count` floats of a buffer, to be freed. */
+float *read_floats(ovoid_context *context, const ov_buffer *buffer, size_t count);
+uint32_t *read_indices(ovoid_context *context, const ov_buffer *buffer, size_t count);
+void write_floats(ovoid_context *context, ov_buffer *buffer, const float *values, size_t count);
+
+/* ---- comparison --------------------------------------------------------------------------- */
+
+/* Fails unless |got - wanted.value| <= tolerance * FLT_EPSILON * wanted.scale (+ 1e-30, for what
+ * lies below the smallest float that every device keeps). Keeps the largest quotient in *worst. */
+void expect_close(double got, reference_sum wanted, double tolerance, double *worst,
+                  const char *what, size_t index);
+
+/* Fails unless |got - wanted| <= tolerance. */
+void expect_near(double got, double wanted, double tolerance, const char *what);
+
+#endif

@@ -27,9 +27,8 @@ expect_err "ovoid: warning: "
 mkdir none
 without_drivers="run env OCL_ICD_VENDORS=$PWD/none/ OPENCL_VENDOR_PATH=$PWD/none OCL_ICD_FILENAMES="
 $without_drivers "$OVOID" devices
-[ "$code" -ne 0 ] || skip "this OpenCL loader cannot be told to find nothing"
+[ ! -s "$out" ] || skip "this OpenCL loader cannot be told to find nothing"
 expect_code 5
-expect_no_out
 expect_err "no OpenCL device was found"
 expect_err "pocl-opencl-icd"
 make_helix 6 a.xyzr

@@ -104,4 +104,8 @@ code=$(cat ../code)
 code=$?
 expect_code 4
 expect_err "cannot write standard output"
+# Were its number given to the trace, the model would end up there.
+"$OVOID" fit a.xyzr $few -q -o - --trace t.csv >&- 2>"$err"
+code=$?
+expect_code 4
 expect_files a.xyzr a.ovoid

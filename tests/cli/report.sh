@@ -25,10 +25,11 @@ expect_code 0
 run "$CHECK_REPORT" r.json a.ovoid t.csv atoms=31
 expect_code 0
 
-# Names that are not UTF-8, or hold quotes, still give JSON and a model file of whole lines.
-name=$(printf 'b"\\\t\377.xyzr')
+# Names that are not UTF-8, or hold quotes or line ends, still give JSON and whole header lines.
+name=$(printf 'b"\\\n\377.xyzr')
 cp a.xyzr "$name"
 run "$OVOID" fit "$name" --iterations 3 -o b.ovoid --report r.json --trace t.csv
 expect_code 0
 run "$CHECK_REPORT" r.json b.ovoid t.csv atoms=31
 expect_code 0
+iconv -f UTF-8 -t UTF-8 r.json >/dev/null 2>&1 || fail "the report should be UTF-8"

@@ -23,6 +23,50 @@ static inline void ov_add(ov_vec *high, ov_vec *low, ov_vec value) {
     *high = sum;
 }
 
+/* Halves a pair of vectors by adding its halves, error free. */
+#define OV_FOLD(name, whole, half_type)                                                            \
+    static inline void name(whole high, whole low, half_type *high_half, half_type *low_half) {    \
+        const half_type sum = high.lo + high.hi;                                                   \
+        const half_type part = sum - high.lo;                                                      \
+        *low_half = (low.lo + low.hi) + ((high.lo - (sum - part)) + (high.hi - part));             \
+        *high_half = sum;                                                                          \
+    }
+#if OV_VECTOR >= 16
+OV_FOLD(ov_fold16, float16, float8)
+#endif
+#if OV_VECTOR >= 8
+OV_FOLD(ov_fold8, float8, float4)
+#endif
+#if OV_VECTOR >= 4
+OV_FOLD(ov_fold4, float4, float2)
+OV_FOLD(ov_fold2, float2, float)
+#endif
+
+/* Sum of a pair of vectors as a pair of scalars. */
+static inline void ov_sum(ov_vec high, ov_vec low, float *high_sum, float *low_sum) {
+#if OV_VECTOR == 1
+    *high_sum = high;
+    *low_sum = low;
+#else
+    float2 high2, low2;
+#if OV_VECTOR >= 8
+    float4 high4, low4;
+#if OV_VECTOR >= 16
+    float8 high8, low8;
+    ov_fold16(high, low, &high8, &low8);
+    ov_fold8(high8, low8, &high4, &low4);
+#else
+    ov_fold8(high, low, &high4, &low4);
+#endif
+    ov_fold4(high4, low4, &high2, &low2);
+#else
+    ov_fold4(high, low, &high2, &low2);
+#endif
+    ov_fold2(high2, low2, high_sum, low_sum);
+#endif
+}
+
+#if OV_LANES > 1
 static inline void ov_add_scalar(float *high, float *low, float value) {
     const float sum = *high + value;
     const float part = sum - *high;
@@ -30,7 +74,6 @@ static inline void ov_add_scalar(float *high, float *low, float value) {
     *high = sum;
 }
 
-#if OV_LANES > 1
 /* Adds up the lanes' pairs in a fixed order; lane 0 holds the result. */
 static inline void ov_add_lanes(float *high, float *low, uint lane, __local float *scratch) {
     for (uint width = OV_LANES / 2; width > 0; width /= 2) {
@@ -116,14 +159,8 @@ __kernel void moments(const uint count, __global const float *restrict points,
 #pragma unroll
     for (uint m = 0; m < OV_MONOMIALS; ++m) {
         ov_add(&total[m], &rest[m], sum[m]);
-        float high = 0.0f, low = 0.0f;
-        float part[OV_VECTOR], part_rest[OV_VECTOR];
-        OV_STORE(total[m], 0, part);
-        OV_STORE(rest[m], 0, part_rest);
-        for (uint c = 0; c < OV_VECTOR; ++c) {
-            ov_add_scalar(&high, &low, part[c]);
-            low += part_rest[c];
-        }
+        float high, low;
+        ov_sum(total[m], rest[m], &high, &low);
 #if OV_LANES > 1
         ov_add_lanes(&high, &low, lane, scratch);
         if (lane == 0)

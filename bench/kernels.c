@@ -231,7 +231,7 @@ static void make_molecule_lists(bench *b, const char *path, const char *model, s
     size_t count;
     ov_quadric *const quadrics = quadrics_of(b, xyzr, atoms, model, &count);
     if (ov_lattice_create(b->context, xyzr, atoms, b->spacing, b->padding, &lattice) ||
-        ov_sample(b->context, xyzr, atoms, b->decay, &lattice, band, &samples))
+        ov_sample(b->context, xyzr, atoms, b->decay, &lattice, band, (ov_sampling){0}, &samples))
         fail(b);
     s->points = samples.points;
     memset(&samples.points, 0, sizeof samples.points);
@@ -264,11 +264,10 @@ typedef struct work {
 static ovoid_status enqueue(bench *b, operation what, setting *s, work *w) {
     switch (what) {
     case FIELD:
-        return ov_field(b->context, &w->operations, &s->points, &s->terms, &s->lists,
-                        &w->value);
+        return ov_field(b->context, &w->operations, &s->points, &s->terms, &s->lists, &w->value);
     case MOMENTS:
-        return ov_moments(b->context, &w->operations, &s->points, &s->terms, &s->lists,
-                          &w->value, &w->moments);
+        return ov_moments(b->context, &w->operations, &s->points, &s->terms, &s->lists, &w->value,
+                          &w->moments);
     default:
         return ov_lists_build(b->context, &s->lists, &s->points, &s->terms, 0.0);
     }

@@ -154,10 +154,18 @@ typedef struct ov_samples {
     ov_buffer gradient; /* its gradient, as ov_field_gradient() stores it */
 } ov_samples;
 
+/* Asked after each piece of the lattice, with the points kept so far; false stops the sampling. */
+typedef struct ov_sampling {
+    bool (*go_on)(uint64_t points, void *user); /* may be NULL */
+    void *user;
+} ov_sampling;
+
 /* Evaluates phi on the lattice piece by piece and keeps the band. OVOID_ERROR_EMPTY when no lattice
- * point lies in it. */
+ * point lies in it, OVOID_ERROR_LIMIT when the device has no room for the points,
+ * OVOID_ERROR_CANCELLED when go_on says so. */
 ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
-                       const ov_lattice *lattice, ov_band band, ov_samples *samples);
+                       const ov_lattice *lattice, ov_band band, ov_sampling sampling,
+                       ov_samples *samples);
 void ov_samples_destroy(ov_samples *samples);
 
 #endif

@@ -33,6 +33,7 @@ typedef struct sampler {
     double decay;
     const ov_lattice *lattice;
     ov_band band;
+    ov_sampling sampling;
     double origin[3]; /* of the kept points */
     piece_grid pieces;
     ov_points points; /* of one piece, relative to its corner */
@@ -280,6 +281,12 @@ static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t
     return check_room(context, s, s->kept_count);
 }
 
+static ovoid_status ask_to_go_on(ovoid_context *context, const sampler *s) {
+    if (!s->sampling.go_on || s->sampling.go_on(s->kept_count, s->sampling.user))
+        return OVOID_OK;
+    return ov_fail(context, OVOID_ERROR_CANCELLED, "stopped while sampling");
+}
+
 static ovoid_status sample_pieces(ovoid_context *context, sampler *s) {
     ovoid_status status = OVOID_OK;
     uint64_t piece = 0;
@@ -292,6 +299,7 @@ static ovoid_status sample_pieces(ovoid_context *context, sampler *s) {
                     continue; /* far outside, and the band has no such points */
                 OV_TRY(evaluate_piece(context, s, piece, at));
                 OV_TRY(keep_band(context, s, at));
+                OV_TRY(ask_to_go_on(context, s));
             }
     if (s->kept_count == 0)
         status = ov_fail(context, OVOID_ERROR_EMPTY,
@@ -335,11 +343,17 @@ static void destroy_sampler(sampler *s) {
 }
 
 ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
-                       const ov_lattice *lattice, ov_band band, ov_samples *samples) {
+                       const ov_lattice *lattice, ov_band band, ov_sampling sampling,
+                       ov_samples *samples) {
     ovoid_status status = OVOID_OK;
     ov_samples made = {0};
     ov_device *device;
-    sampler s = {.xyzr = xyzr, .atoms = atoms, .decay = decay, .lattice = lattice, .band = band};
+    sampler s = {.xyzr = xyzr,
+                 .atoms = atoms,
+                 .decay = decay,
+                 .lattice = lattice,
+                 .band = band,
+                 .sampling = sampling};
     for (size_t axis = 0; axis < 3; ++axis)
         s.origin[axis] =
             lattice->low[axis] + 0.5 * lattice->step[axis] * (double)lattice->size[axis];

@@ -3,26 +3,38 @@
 
 #include <stdlib.h>
 
-static bool report_sampling(const ovoid_fit_options *options, size_t atoms) {
-    if (!options->progress)
-        return true;
-    const ovoid_progress progress = {
-        .stage = "sample", .iterations = options->l1.iterations, .ellipsoids = atoms};
-    return options->progress(&progress, options->user);
+typedef struct sampling_report {
+    const ovoid_fit_options *options;
+    size_t atoms;
+    double began;
+} sampling_report;
+
+static bool report_sampling(uint64_t points, void *user) {
+    const sampling_report *const report = user;
+    const ovoid_fit_options *const options = report->options;
+    const ovoid_progress progress = {.stage = "sample",
+                                     .iterations = options->l1.iterations,
+                                     .ellipsoids = report->atoms,
+                                     .points = points,
+                                     .seconds = ov_seconds() - report->began};
+    return !options->progress || options->progress(&progress, options->user);
 }
 
 /* Section 3.2.1 of the paper: |phi - c| <= 1. */
 static ovoid_status sample_band(ovoid_context *context, const ovoid_molecule *molecule,
-                                const ovoid_fit_options *options, ov_samples *samples) {
+                                const ovoid_fit_options *options, double began,
+                                ov_samples *samples) {
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const ov_band band = {.low = options->isovalue - 1.0, .high = options->isovalue + 1.0};
+    sampling_report report = {.options = options, .atoms = atoms, .began = began};
+    const ov_sampling sampling = {.go_on = report_sampling, .user = &report};
     ov_lattice lattice;
     const ovoid_status status =
         ov_lattice_create(context, xyzr, atoms, options->spacing, options->padding, &lattice);
     return status != OVOID_OK
                ? status
-               : ov_sample(context, xyzr, atoms, options->decay, &lattice, band, samples);
+               : ov_sample(context, xyzr, atoms, options->decay, &lattice, band, sampling, samples);
 }
 
 ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
@@ -40,11 +52,7 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
     OV_TRY(ov_fit_options_check(context, options));
     OV_TRY(ov_atoms_check(context, ovoid_molecule_xyzr(molecule), atoms, options->decay));
     OV_TRY(ov_device_get(context, &device));
-    if (!report_sampling(options, atoms)) {
-        status = ov_fail(context, OVOID_ERROR_CANCELLED, "stopped before sampling");
-        goto cleanup;
-    }
-    OV_TRY(sample_band(context, molecule, options, &samples));
+    OV_TRY(sample_band(context, molecule, options, began, &samples));
     done.sample_seconds = ov_seconds() - began;
     OV_TRY(ov_l1_fit(context, ovoid_molecule_xyzr(molecule), atoms, &samples, options, began,
                      &ellipsoids, &done));

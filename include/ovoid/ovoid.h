@@ -257,7 +257,8 @@ typedef enum ovoid_method {
     OVOID_METHOD_L1 = 0 /* the paper's Algorithm 1 */
 } ovoid_method;
 
-/* What a progress callback sees after each iteration. */
+/* What a progress callback sees: while sampling after each piece of the lattice (with the points so
+ * far), then after each iteration. */
 typedef struct ovoid_progress {
     const char *stage;   /* "sample", "sparse" or "accuracy" */
     uint64_t iteration;  /* 1 .. iterations; 0 while sampling */

@@ -55,6 +55,9 @@ static void print_settings(const fit_job *job, char *text, size_t size) {
     for (size_t i = 0; i < fit_l1_count && used < size; i++)
         used += (size_t)snprintf(text + used, size - used, ", %s %.9g", fit_l1_numbers[i].name,
                                  cli_number_value(&fit_l1_numbers[i], options));
+    if (used < size)
+        snprintf(text + used, size - used, ", first-step %s",
+                 fit_first_step_name(options->l1.first_step));
 }
 
 /* The model file says where it comes from. */

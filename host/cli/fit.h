@@ -43,6 +43,7 @@ typedef struct fit_job {
 bool fit_options_parse(int argc, char **argv, fit_job *job, int *code);
 
 const char *fit_method_name(ovoid_method method);
+const char *fit_first_step_name(ovoid_first_step first_step);
 
 /* The numbers of ovoid_fit_options that options set, apart for the surface and for method l1. */
 extern const cli_number fit_surface_numbers[], fit_l1_numbers[];

@@ -38,7 +38,7 @@ const cli_number fit_l1_numbers[] = {
     REAL("shrink", l1.shrink, 0, true, 0.999, false, "",
          "line search: factor after a rejected step"),
     REAL("grow", l1.grow, 1, false, 1e6, false, "",
-         "line search: first step tried, over the last accepted one"),
+         "line search: factor of the last step, for the next one to try"),
     COUNT("max-backtracks", l1.max_backtracks, 1, 1000,
           "line search: rejected steps before giving up"),
 };
@@ -50,13 +50,18 @@ enum {
 };
 
 /* Values of the long options; those of the numbers follow. */
-enum { OUTPUT = 256, METHOD, DEVICE, REPORT, TRACE, QUIET, FORMAT, HELP, NUMBERS };
+enum { OUTPUT = 256, METHOD, DEVICE, REPORT, TRACE, QUIET, FORMAT, FIRST_STEP, HELP, NUMBERS };
 
 static const struct option named[] = {
-    {"output", required_argument, NULL, OUTPUT}, {"method", required_argument, NULL, METHOD},
-    {"device", required_argument, NULL, DEVICE}, {"report", required_argument, NULL, REPORT},
-    {"trace", required_argument, NULL, TRACE},   {"quiet", no_argument, NULL, QUIET},
-    {"format", required_argument, NULL, FORMAT}, {"help", no_argument, NULL, HELP},
+    {"output", required_argument, NULL, OUTPUT},
+    {"method", required_argument, NULL, METHOD},
+    {"device", required_argument, NULL, DEVICE},
+    {"report", required_argument, NULL, REPORT},
+    {"trace", required_argument, NULL, TRACE},
+    {"quiet", no_argument, NULL, QUIET},
+    {"format", required_argument, NULL, FORMAT},
+    {"first-step", required_argument, NULL, FIRST_STEP},
+    {"help", no_argument, NULL, HELP},
 };
 enum { NAMED_COUNT = sizeof named / sizeof *named };
 
@@ -70,6 +75,16 @@ const char *fit_method_name(ovoid_method method) {
     switch (method) {
     case OVOID_METHOD_L1:
         return "l1";
+    }
+    return "unknown";
+}
+
+const char *fit_first_step_name(ovoid_first_step first_step) {
+    switch (first_step) {
+    case OVOID_FIRST_STEP_SECANT:
+        return "secant";
+    case OVOID_FIRST_STEP_GROW:
+        return "grow";
     }
     return "unknown";
 }
@@ -111,6 +126,11 @@ void cli_fit_help(FILE *stream) {
     fputs("\nMethod l1:\n", stream);
     for (size_t i = 0; i < fit_l1_count; i++)
         cli_number_help(&fit_l1_numbers[i], &defaults, stream);
+    fprintf(
+        stream,
+        "  --first-step NAME   line search: what is tried first, secant (the inverse curvature\n"
+        "                      along the last step, where it is defined) or grow (default %s)\n",
+        fit_first_step_name(defaults.l1.first_step));
     fprintf(stream,
             "\n"
             "With --iterations alone, --sparse-iterations keeps its share of %.3g %%.\n"
@@ -133,6 +153,18 @@ static bool parse_method(const char *text, ovoid_method *method) {
         return false;
     }
     *method = OVOID_METHOD_L1;
+    return true;
+}
+
+static bool parse_first_step(const char *text, ovoid_first_step *first_step) {
+    if (strcmp(text, fit_first_step_name(OVOID_FIRST_STEP_SECANT)) == 0) {
+        *first_step = OVOID_FIRST_STEP_SECANT;
+    } else if (strcmp(text, fit_first_step_name(OVOID_FIRST_STEP_GROW)) == 0) {
+        *first_step = OVOID_FIRST_STEP_GROW;
+    } else {
+        cli_error("--first-step takes secant or grow, not '%s'", text);
+        return false;
+    }
     return true;
 }
 
@@ -267,6 +299,9 @@ bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
             break;
         case FORMAT:
             good = parse_format(optarg, &job->format);
+            break;
+        case FIRST_STEP:
+            good = parse_first_step(optarg, &job->options.l1.first_step);
             break;
         case 'h':
         case HELP:

@@ -4,11 +4,16 @@
 
 typedef unsigned long long count; /* as printf wants it */
 
+static const char *plural(count number) {
+    return number == 1 ? "" : "s";
+}
+
 static void print_molecule(const fit_job *job) {
     ovoid_molecule_counts counts = ovoid_molecule_read_counts(job->molecule);
     FILE *out = job->summary;
-    fprintf(out, "molecule  %s: %llu atoms",
-            strcmp(job->input, "-") == 0 ? "standard input" : job->input, (count)counts.atoms);
+    fprintf(out, "molecule  %s: %llu atom%s",
+            strcmp(job->input, "-") == 0 ? "standard input" : job->input, (count)counts.atoms,
+            plural(counts.atoms));
     if (counts.zero_radius)
         fprintf(out, ", %llu of them of radius 0", (count)counts.zero_radius);
     if (counts.skipped)
@@ -48,11 +53,12 @@ void fit_summary_after(const fit_job *job) {
     fprintf(out, "surface   decay %.9g Å⁻², isovalue %.9g\n", options->decay, options->isovalue);
     fprintf(out, "points    %llu, spacing %.9g Å, padding %.9g Å\n", (count)result->points,
             options->spacing, options->padding);
-    fprintf(out, "fit       %llu iterations of method %s\n", (count)result->iterations,
-            fit_method_name(options->method));
-    fprintf(out, "model     %llu ellipsoids for %zu atoms: sparse ratio %.3g\n",
-            (count)result->ellipsoids, ovoid_molecule_atoms(job->molecule),
-            (double)result->ellipsoids / (double)ovoid_molecule_atoms(job->molecule));
+    const count atoms = ovoid_molecule_atoms(job->molecule);
+    fprintf(out, "fit       %llu iteration%s of method %s\n", (count)result->iterations,
+            plural(result->iterations), fit_method_name(options->method));
+    fprintf(out, "model     %llu ellipsoid%s for %llu atom%s: sparse ratio %.3g\n",
+            (count)result->ellipsoids, plural(result->ellipsoids), atoms, plural(atoms),
+            (double)result->ellipsoids / (double)atoms);
     fprintf(out, "error     rms %.3g, largest %.3g (of the field, over the points)\n",
             result->rms_error, result->max_error);
     fprintf(out, "time      %.2f s: device %.2f, read %.2f, sample %.2f, fit %.2f, write %.2f\n",

@@ -86,9 +86,9 @@ static const char *const numbers[] = {"atoms",
                                       "profile.moments_passes",
                                       "profile.launches",
                                       "opencl.compute_units"};
-static const char *const texts[] = {"version",       "input",         "output",
-                                    "method",        "device",        "opencl.platform",
-                                    "opencl.vendor", "opencl.driver", "opencl.version"};
+static const char *const texts[] = {
+    "version", "input",           "output",        "options.first_step", "method",
+    "device",  "opencl.platform", "opencl.vendor", "opencl.driver",      "opencl.version"};
 
 static void check_keys(const cJSON *report) {
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)

@@ -19,7 +19,10 @@ size_t ov_item_group(const ov_device *device) {
     return device->shape.lanes == 1 ? 1 : 64;
 }
 
-/* `groups` packs or terms, each handled by the shape's lanes as one work-group. */
+/* Packs or terms in a work-group of a CPU: a few, to share what a group costs to start. */
+#define CPU_GROUP 4
+
+/* `groups` packs or terms, each handled by the shape's lanes: on GPUs as one work-group. */
 static ovoid_status launch_lanes(ovoid_context *context, const ov_kernel *kernel, size_t groups,
                                  const ov_arg *args, size_t arg_count) {
     ov_device *device;
@@ -27,7 +30,8 @@ static ovoid_status launch_lanes(ovoid_context *context, const ov_kernel *kernel
     if (status != OVOID_OK)
         return status;
     const size_t lanes = device->shape.lanes;
-    return ov_launch(context, kernel, groups * lanes, lanes, args, arg_count);
+    return ov_launch(context, kernel, groups * lanes, lanes == 1 ? CPU_GROUP : lanes, args,
+                     arg_count);
 }
 #define LAUNCH_LANES(context, kernel, groups, ...)                                                 \
     launch_lanes((context), (kernel), (groups), (const ov_arg[]){__VA_ARGS__},                     \

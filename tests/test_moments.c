@@ -128,8 +128,8 @@ static void long_lists_that_cancel(void **state) {
     double worst = 0.0;
     reference_moments(&quadric, b.xyz, weights, count, wanted);
     for (size_t m = 0; m < OV_MONOMIALS; ++m)
-        expect_close(got[m], wanted[m], 0.05, &worst, "moment", m);
-    print_message("%zu weights of either sign: %.4f of 0.05\n", count, worst);
+        expect_close(got[m], wanted[m], 0.1, &worst, "moment", m);
+    print_message("%zu weights of either sign: %.4f of 0.1\n", count, worst);
     free(got);
     free(weights);
     free(u);

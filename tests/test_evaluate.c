@@ -1,0 +1,227 @@
+/* The public functions that evaluate a molecule's or a model's field at the caller's points. */
+#include "support.h"
+
+enum { ATOMS = 15 };
+
+static ovoid_molecule *random_molecule(ovoid_context *context, double *xyzr) {
+    test_random random = {1};
+    ovoid_molecule *molecule = NULL;
+    for (size_t i = 0; i < ATOMS; ++i) {
+        for (size_t k = 0; k < 3; ++k)
+            xyzr[4 * i + k] = 100.0 + random_uniform(&random, -4.0, 4.0);
+        xyzr[4 * i + 3] = random_uniform(&random, 0.0, 2.0);
+    }
+    test_check(context, ovoid_molecule_create(context, xyzr, ATOMS, &molecule));
+    return molecule;
+}
+
+/* About the middle of random_molecule(). */
+static double *random_positions(size_t count) {
+    test_random random = {2};
+    double *const xyz = test_alloc(3 * count, sizeof *xyz);
+    for (size_t k = 0; k < 3 * count; ++k)
+        xyz[k] = 100.0 + random_uniform(&random, -6.0, 6.0);
+    return xyz;
+}
+
+/* Value k belongs to point k. */
+static void molecule_field_keeps_the_order(void **state) {
+    const double d = 0.5;
+    const size_t count = test_size(3000, 300);
+    double xyzr[4 * ATOMS];
+    ovoid_molecule *molecule = random_molecule(*state, xyzr);
+    double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value),
+                  *const gradient = test_alloc(3 * count, sizeof *gradient);
+    test_check(*state, ovoid_molecule_field(*state, molecule, d, xyz, count, value, gradient));
+    for (size_t k = 0; k < count; ++k) {
+        const double wanted = reference_phi(xyzr, ATOMS, d, xyz + 3 * k);
+        expect_near(value[k], wanted, 5e-6 * wanted + 1e-7 * ATOMS, "phi");
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const double h = 1e-4;
+            double up[3], down[3];
+            memcpy(up, xyz + 3 * k, sizeof up);
+            memcpy(down, xyz + 3 * k, sizeof down);
+            up[axis] += h;
+            down[axis] -= h;
+            const double slope =
+                (reference_phi(xyzr, ATOMS, d, up) - reference_phi(xyzr, ATOMS, d, down)) /
+                (up[axis] - down[axis]);
+            expect_near(gradient[3 * k + axis], slope, 2e-5 * wanted + 1e-6 * ATOMS,
+                        "a component of phi's gradient");
+        }
+    }
+    free(xyz);
+    free(value);
+    free(gradient);
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void model_field_is_the_papers_sum(void **state) {
+    const size_t count = test_size(2000, 200), size = 20;
+    test_random random = {3};
+    ovoid_ellipsoid ellipsoids[20];
+    ovoid_model *model = NULL;
+    random_ellipsoids(&random, MODEL_RANDOM, 4.0, ellipsoids, size);
+    for (size_t i = 0; i < size; ++i)
+        for (int k = 0; k < 3; ++k)
+            ellipsoids[i].centre[k] += 100.0;
+    test_check(*state, ovoid_model_create(*state, ellipsoids, size, 0.5, 1.0, &model));
+    double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value),
+                  *const gradient = test_alloc(3 * count, sizeof *gradient);
+    test_check(*state, ovoid_model_field(*state, model, xyz, count, value, gradient));
+    for (size_t k = 0; k < count; ++k) {
+        double wanted = 0.0, slope[3] = {0};
+        for (size_t i = 0; i < size; ++i) {
+            const double h = 1e-4;
+            wanted += reference_ellipsoid(&ellipsoids[i], xyz + 3 * k);
+            for (int axis = 0; axis < 3; ++axis) {
+                double up[3], down[3];
+                memcpy(up, xyz + 3 * k, sizeof up);
+                memcpy(down, xyz + 3 * k, sizeof down);
+                up[axis] += h;
+                down[axis] -= h;
+                slope[axis] += (reference_ellipsoid(&ellipsoids[i], up) -
+                                reference_ellipsoid(&ellipsoids[i], down)) /
+                               (up[axis] - down[axis]);
+            }
+        }
+        expect_near(value[k], wanted, 1e-5 * wanted + 1e-6, "phi~");
+        for (int axis = 0; axis < 3; ++axis)
+            expect_near(gradient[3 * k + (size_t)axis], slope[axis], 5e-5 * wanted + 1e-5,
+                        "a component of phi~'s gradient");
+    }
+    free(xyz);
+    free(value);
+    free(gradient);
+    ovoid_model_destroy(&model);
+}
+
+/* The relative error that the header states, where phi is not small. */
+static void error_is_as_the_header_says(void **state) {
+    const size_t count = test_size(5000, 300);
+    double xyzr[4 * ATOMS], worst = 0.0;
+    ovoid_molecule *molecule = random_molecule(*state, xyzr);
+    double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value);
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, NULL));
+    for (size_t k = 0; k < count; ++k) {
+        const double wanted = reference_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
+        if (wanted > 0.1)
+            worst = fmax(worst, fabs(value[k] - wanted) / wanted);
+    }
+    print_message("largest relative error %.2g\n", worst);
+    assert_true(worst < 2e-6);
+    free(xyz);
+    free(value);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* More points than are handled at once: the second piece takes its own place. */
+static void more_than_a_million_points(void **state) {
+    const size_t count = ((size_t)1 << 20) + 77;
+    double xyzr[4 * ATOMS];
+    if (test_small())
+        skip();
+    ovoid_molecule *molecule = random_molecule(*state, xyzr);
+    double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value),
+                  *const gradient = test_alloc(3 * count, sizeof *gradient);
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
+    for (size_t k = 0; k < count; k += k < count - 200 ? 997 : 1) {
+        const double wanted = reference_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
+        expect_near(value[k], wanted, 5e-6 * wanted + 1e-7 * ATOMS, "phi");
+    }
+    double single[4];
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz + 3 * (count - 1), 1, single,
+                                            single + 1));
+    expect_near(gradient[3 * count - 1], single[3], 1e-5, "the last gradient");
+    free(xyz);
+    free(value);
+    free(gradient);
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void odd_points(void **state) {
+    double xyzr[4 * ATOMS], value[4] = {-1.0, -1.0, -1.0, -1.0};
+    ovoid_molecule *molecule = random_molecule(*state, xyzr);
+    /* none */
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, NULL, 0, NULL, NULL));
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyzr, 0, value, NULL));
+    assert_true(value[0] == -1.0);
+    /* far away, and the same point several times */
+    const double xyz[] = {1e7,   0.0,   0.0,   100.0, 100.0, 100.0,
+                          100.0, 100.0, 100.0, -1e30, 1e30,  0.0};
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 4, value, NULL));
+    assert_true(value[0] >= 0.0 && value[0] < 1e-30 && value[3] >= 0.0 && value[3] < 1e-30);
+    assert_true(value[1] == value[2]);
+    expect_near(value[1], reference_phi(xyzr, ATOMS, 0.5, xyz + 3), 1e-5 * value[1], "phi");
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* A point so far out that its squares overflow is outside, not a NaN. */
+static void point_beyond_single_precision(void **state) {
+    const ovoid_ellipsoid ellipsoid = {
+        .amplitude = 2.0, .decay = {0.3, 1.0, 0.7}, .angle = {0.5, 0.6, 0.7}};
+    const double xyz[] = {1e25, -1e25, 1e25, 0.5, 0.0, 0.0, -1e37, 1e37, 1e37};
+    double value[3];
+    ovoid_model *model = NULL;
+    test_check(*state, ovoid_model_create(*state, &ellipsoid, 1, 0.5, 1.0, &model));
+    test_check(*state, ovoid_model_field(*state, model, xyz, 3, value, NULL));
+    assert_true(value[0] >= 0.0 && value[0] < 1e-30);
+    assert_true(value[2] >= 0.0 && value[2] < 1e-30);
+    const double wanted = reference_ellipsoid(&ellipsoid, xyz + 3);
+    expect_near(value[1], wanted, 2e-6 * wanted, "phi~");
+    ovoid_model_destroy(&model);
+}
+
+static void bad_arguments_change_nothing(void **state) {
+    double xyzr[4 * ATOMS], value[2] = {-1.0, -1.0}, gradient[6] = {-1.0};
+    ovoid_molecule *molecule = random_molecule(*state, xyzr);
+    const double xyz[6] = {1.0, 2.0, 3.0, 4.0, NAN, 6.0};
+    const double infinite[3] = {INFINITY, 0.0, 0.0};
+    const ovoid_status argument = OVOID_ERROR_ARGUMENT;
+    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 2, value, gradient),
+                 argument, "point 1");
+    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, infinite, 1, value, gradient),
+                 argument, "point 0");
+    test_refused(*state, ovoid_molecule_field(*state, NULL, 0.5, xyz, 1, value, NULL), argument,
+                 "NULL");
+    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, NULL, 1, value, NULL),
+                 argument, "NULL");
+    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 1, NULL, NULL), argument,
+                 "NULL");
+    assert_int_equal(ovoid_molecule_field(NULL, molecule, 0.5, xyz, 1, value, NULL), argument);
+    test_refused(*state, ovoid_model_field(*state, NULL, xyz, 1, value, NULL), argument, "NULL");
+    const double decays[] = {0.0, -1.0, NAN, INFINITY, 101.0};
+    for (size_t k = 0; k < sizeof decays / sizeof decays[0]; ++k)
+        test_refused(*state, ovoid_molecule_field(*state, molecule, decays[k], xyz, 1, value, NULL),
+                     argument, "decay");
+    assert_true(value[0] == -1.0 && value[1] == -1.0 && gradient[0] == -1.0);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* exp(d r^2) beyond single precision is refused rather than wrong. */
+static void huge_radius_is_refused(void **state) {
+    const double xyzr[4] = {0.0, 0.0, 0.0, 14.0}, xyz[3] = {14.0, 0.0, 0.0};
+    double value = -1.0;
+    ovoid_molecule *molecule = NULL;
+    test_check(*state, ovoid_molecule_create(*state, xyzr, 1, &molecule));
+    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 1, &value, NULL),
+                 OVOID_ERROR_LIMIT, "radius");
+    assert_true(value == -1.0);
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.3, xyz, 1, &value, NULL));
+    expect_near(value, 1.0, 1e-4, "phi on the sphere of a large atom");
+    ovoid_molecule_destroy(&molecule);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(molecule_field_keeps_the_order),
+        cmocka_unit_test(model_field_is_the_papers_sum),
+        cmocka_unit_test(error_is_as_the_header_says),
+        cmocka_unit_test(more_than_a_million_points),
+        cmocka_unit_test(odd_points),
+        cmocka_unit_test(point_beyond_single_precision),
+        cmocka_unit_test(bad_arguments_change_nothing),
+        cmocka_unit_test(huge_radius_is_refused),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

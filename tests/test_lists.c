@@ -1,0 +1,300 @@
+/*
+ * The two lists that pair terms with packs, against the exact least exponent over every pack's box.
+ */
+#include "support.h"
+
+/* The lists, on the host. */
+typedef struct pairs {
+    size_t terms, packs, items;
+    uint32_t *term_start, *term_item, *pack_start, *pack_item;
+} pairs;
+
+static void read_pairs(ovoid_context *context, const ov_lists *lists, pairs *p) {
+    p->terms = lists->terms;
+    p->packs = lists->packs;
+    p->items = lists->items;
+    p->term_start = read_indices(context, &lists->term_start, p->terms + 1);
+    p->term_item = read_indices(context, &lists->term_item, p->items);
+    p->pack_start = read_indices(context, &lists->pack_start, p->packs + 1);
+    p->pack_item = read_indices(context, &lists->pack_item, p->items);
+}
+
+static void free_pairs(pairs *p) {
+    free(p->term_start);
+    free(p->term_item);
+    free(p->pack_start);
+    free(p->pack_item);
+}
+
+/* Starts run from 0 to the number of items, items ascend without repeats and within range. */
+static void expect_csr(const uint32_t *start, const uint32_t *item, size_t count, size_t items,
+                       size_t range) {
+    assert_int_equal(start[0], 0);
+    assert_int_equal(start[count], items);
+    for (size_t i = 0; i < count; ++i) {
+        assert_true(start[i] <= start[i + 1]);
+        for (uint32_t k = start[i]; k < start[i + 1]; ++k) {
+            assert_true(item[k] < range);
+            assert_true(k == start[i] || item[k - 1] < item[k]);
+        }
+    }
+}
+
+static bool holds(const uint32_t *start, const uint32_t *item, size_t list, uint32_t value) {
+    uint32_t low = start[list], high = start[list + 1];
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (item[middle] < value)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < start[list + 1] && item[low] == value;
+}
+
+/* Both lists are in order and each the transpose of the other. */
+static void expect_lists(const pairs *p) {
+    expect_csr(p->term_start, p->term_item, p->terms, p->items, p->packs);
+    expect_csr(p->pack_start, p->pack_item, p->packs, p->items, p->terms);
+    for (size_t i = 0; i < p->terms; ++i)
+        for (uint32_t k = p->term_start[i]; k < p->term_start[i + 1]; ++k)
+            assert_true(holds(p->pack_start, p->pack_item, p->term_item[k], (uint32_t)i));
+}
+
+static void pack_box(const bench *b, size_t pack, double skin, double box[6]) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+        box[axis] = INFINITY;
+        box[axis + 3] = -INFINITY;
+        for (size_t k = pack * OV_PACK; k < (pack + 1) * OV_PACK && k < b->count; ++k) {
+            box[axis] = fmin(box[axis], b->xyz[3 * k + axis] - skin);
+            box[axis + 3] = fmax(box[axis + 3], b->xyz[3 * k + axis] + skin);
+        }
+    }
+}
+
+/* What the comparison with the exact answer found. */
+typedef struct tally {
+    size_t wanted; /* pairs that must be listed */
+    size_t listed;
+    size_t excess; /* listed although the least exponent is above the reach */
+} tally;
+
+/* No pair is lost whose least exponent is within the reach by more than float rounding. */
+static void expect_pairs(const bench *b, const pairs *p, double cutoff, double skin, tally *t) {
+    for (size_t i = 0; i < b->terms_count; ++i) {
+        const double reach = log(b->quadrics[i].amplitude / cutoff);
+        for (size_t pack = 0; pack < p->packs; ++pack) {
+            double box[6];
+            pack_box(b, pack, skin, box);
+            const double least = reference_least_exponent(&b->quadrics[i], box);
+            const bool listed = holds(p->term_start, p->term_item, i, (uint32_t)pack);
+            if (least <= reach - 1e-3 && !listed)
+                fail_msg("term %zu, pack %zu: least exponent %g, reach %g, not listed", i, pack,
+                         least, reach);
+            t->wanted += least <= reach;
+            t->listed += listed;
+            t->excess += listed && least > reach + 1e-3;
+        }
+    }
+}
+
+static void random_bench(bench *b, ovoid_context *context, model_kind kind, size_t terms,
+                         size_t count, double cutoff, uint64_t seed) {
+    test_random random = {seed};
+    ovoid_ellipsoid *const ellipsoids = test_alloc(terms, sizeof *ellipsoids);
+    ov_quadric *const quadrics = test_alloc(terms, sizeof *quadrics);
+    random_ellipsoids(&random, kind, 12.0, ellipsoids, terms);
+    for (size_t i = 0; i < terms; ++i) {
+        for (int k = 0; kind != MODEL_NEEDLE && kind != MODEL_PANCAKE && k < 3; ++k)
+            ellipsoids[i].decay[k] *= 2.0; /* so that reaches are shorter than the box */
+        ov_quadric_of_ellipsoid(&ellipsoids[i], &quadrics[i]);
+    }
+    float *const xyz = random_points(&random, count, 12.0);
+    bench_create(b, context, quadrics, terms, xyz, count, cutoff);
+    free(xyz);
+    free(quadrics);
+    free(ellipsoids);
+}
+
+/* Three sweeps of coordinate descent find the minimum over most boxes: all of them for sphere-like
+ * terms, and all but a few in a thousand even for needles and pancakes a hundred times as long as
+ * thick. Only so many pairs may be listed in vain. */
+static void lists_hold_what_terms_reach(void **state) {
+    const double cutoff = 1e-5;
+    for (int kind = 0; kind < MODEL_KINDS; ++kind)
+        for (int grown = 0; grown <= 1; ++grown) {
+            const double skin = grown ? 0.37 : 0.0;
+            bench b;
+            pairs p;
+            tally t = {0};
+            random_bench(&b, *state, (model_kind)kind, test_size(150, 15), test_size(6000, 700),
+                         cutoff, 40 + (uint64_t)kind);
+            test_check(*state, ov_lists_build(*state, &b.lists, &b.points, &b.terms, skin));
+            read_pairs(*state, &b.lists, &p);
+            expect_lists(&p);
+            expect_pairs(&b, &p, cutoff, skin, &t);
+            print_message("%s, skin %.2f: %zu of %zu pairs needed, %zu listed\n",
+                          model_kind_name((model_kind)kind), skin, t.wanted, p.terms * p.packs,
+                          t.listed);
+            if (kind != MODEL_TINY)
+                assert_true(t.wanted > 0);
+            assert_true(t.wanted < p.terms * p.packs);
+            assert_true(t.excess <= (kind == MODEL_SPHERE ? 0 : 2 + t.wanted / 100));
+            free_pairs(&p);
+            bench_destroy(&b);
+        }
+}
+
+/* A skin of s finds all pairs of terms that have moved by up to s. */
+static void skin_covers_motion(void **state) {
+    const double cutoff = 1e-4, skin = 0.5, origin[3] = {0};
+    bench b;
+    pairs p;
+    test_random random = {50};
+    random_bench(&b, *state, MODEL_RANDOM, test_size(100, 15), test_size(3000, 500), cutoff, 51);
+    test_check(*state, ov_lists_build(*state, &b.lists, &b.points, &b.terms, skin));
+    read_pairs(*state, &b.lists, &p);
+    const size_t with_skin = p.items;
+    for (size_t i = 0; i < b.terms_count; ++i) {
+        double step[3], length = 0.0;
+        for (int k = 0; k < 3; ++k) {
+            step[k] = random_uniform(&random, -1.0, 1.0);
+            length += step[k] * step[k];
+        }
+        for (int k = 0; k < 3; ++k)
+            b.quadrics[i].centre[k] += 0.999 * skin * step[k] / sqrt(length);
+    }
+    tally t = {0};
+    expect_pairs(&b, &p, cutoff, 0.0, &t);
+    free_pairs(&p);
+    test_check(*state, ov_terms_set(*state, &b.terms, b.quadrics, b.terms_count, origin, cutoff));
+    test_check(*state, ov_lists_build(*state, &b.lists, &b.points, &b.terms, 0.0));
+    assert_true(b.lists.items < with_skin);
+    bench_destroy(&b);
+}
+
+/* Levels of the tree: one group up to 16 packs, then 256, 4096. The whole box in one term's reach,
+ * and small terms scattered, so that walks end at every depth. */
+static void trees_of_every_depth(void **state) {
+    const size_t packs[] = {1, 16, 17, 256, 257, 4096, 4097};
+    const size_t count = test_size(sizeof packs / sizeof packs[0], 5);
+    const double cutoff = 1e-4;
+    for (size_t n = 0; n < count; ++n) {
+        enum { TERMS = 40 };
+        bench b;
+        pairs p;
+        tally t = {0};
+        test_random random = {60 + n};
+        ov_quadric quadrics[TERMS] = {0};
+        const size_t points = packs[n] * OV_PACK - n;
+        const double half = 0.4 * cbrt((double)points);
+        for (int i = 0; i < TERMS; ++i) {
+            ov_quadric *const q = &quadrics[i];
+            q->amplitude = 1.0;
+            q->a[0] = q->a[3] = q->a[5] = i == 0 ? 1e-6 : 4.0;
+            for (int k = 0; k < 3; ++k)
+                q->centre[k] = (float)random_uniform(&random, -half, half);
+        }
+        float *const xyz = random_points(&random, points, half);
+        bench_create(&b, *state, quadrics, TERMS, xyz, points, cutoff);
+        assert_int_equal(b.points.packs, packs[n]);
+        read_pairs(*state, &b.lists, &p);
+        expect_lists(&p);
+        expect_pairs(&b, &p, cutoff, 0.0, &t);
+        assert_int_equal(p.term_start[1], packs[n]);
+        assert_int_equal(t.excess, 0);
+        free_pairs(&p);
+        free(xyz);
+        bench_destroy(&b);
+    }
+}
+
+/* A term below the cut-off reaches nothing, not even the point at its centre; one just above it
+ * does. */
+static void terms_below_the_cut_off(void **state) {
+    const double cutoff = 1e-4;
+    const ov_quadric quadrics[3] = {
+        {.amplitude = 0.999e-4, .a = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0}},
+        {.amplitude = 1.001e-4, .a = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0}},
+        {.amplitude = 1e-30, .a = {1e-8, 0.0, 0.0, 1e-8, 0.0, 1e-8}},
+    };
+    const float xyz[3] = {0};
+    bench b;
+    pairs p;
+    bench_create(&b, *state, quadrics, 3, xyz, 1, cutoff);
+    read_pairs(*state, &b.lists, &p);
+    expect_lists(&p);
+    assert_int_equal(p.items, 1);
+    assert_true(holds(p.term_start, p.term_item, 1, 0));
+    free_pairs(&p);
+    bench_destroy(&b);
+}
+
+static void nothing_to_pair(void **state) {
+    const ov_quadric far = {
+        .amplitude = 1.0, .centre = {1e4, 0.0, 0.0}, .a = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0}};
+    test_random random = {70};
+    float *const xyz = random_points(&random, 1000, 5.0);
+    const size_t terms[] = {1, 0, 1, 0}, counts[] = {1000, 1000, 0, 0};
+    for (int n = 0; n < 4; ++n) {
+        bench b;
+        pairs p;
+        bench_create(&b, *state, &far, terms[n], xyz, counts[n], 1e-7);
+        read_pairs(*state, &b.lists, &p);
+        assert_int_equal(p.items, 0);
+        if (counts[n] > 0 && terms[n] > 0)
+            expect_lists(&p);
+        free_pairs(&p);
+        bench_destroy(&b);
+    }
+    free(xyz);
+}
+
+/* One structure serves fits whose terms grow fewer and samplers whose pieces differ. */
+static void lists_can_be_rebuilt(void **state) {
+    const double cutoff = 1e-4, origin[3] = {0};
+    bench b;
+    random_bench(&b, *state, MODEL_RANDOM, 40, test_size(2000, 300), cutoff, 80);
+    for (size_t terms = 40; terms > 10; terms -= 13) {
+        pairs p;
+        tally t = {0};
+        b.terms_count = terms;
+        test_check(*state, ov_terms_set(*state, &b.terms, b.quadrics, terms, origin, cutoff));
+        test_check(*state, ov_lists_build(*state, &b.lists, &b.points, &b.terms, 0.0));
+        read_pairs(*state, &b.lists, &p);
+        assert_int_equal(p.terms, terms);
+        expect_lists(&p);
+        expect_pairs(&b, &p, cutoff, 0.0, &t);
+        free_pairs(&p);
+    }
+    bench_destroy(&b);
+}
+
+/* Order of construction aside, the same input gives the same lists: sums have one order. */
+static void lists_are_reproducible(void **state) {
+    bench b;
+    pairs first, second;
+    random_bench(&b, *state, MODEL_RANDOM, test_size(400, 30), test_size(4000, 300), 1e-5, 90);
+    read_pairs(*state, &b.lists, &first);
+    test_check(*state, ov_lists_build(*state, &b.lists, &b.points, &b.terms, 0.0));
+    read_pairs(*state, &b.lists, &second);
+    assert_int_equal(first.items, second.items);
+    assert_memory_equal(first.pack_item, second.pack_item, first.items * sizeof(uint32_t));
+    assert_memory_equal(first.term_item, second.term_item, first.items * sizeof(uint32_t));
+    free_pairs(&first);
+    free_pairs(&second);
+    bench_destroy(&b);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lists_hold_what_terms_reach),
+        cmocka_unit_test(skin_covers_motion),
+        cmocka_unit_test(trees_of_every_depth),
+        cmocka_unit_test(terms_below_the_cut_off),
+        cmocka_unit_test(nothing_to_pair),
+        cmocka_unit_test(lists_can_be_rebuilt),
+        cmocka_unit_test(lists_are_reproducible),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -1,0 +1,297 @@
+/* Points in packs: the curve, the sort, the tree of boxes, the packs. Nothing here needs a kernel,
+ * but points live on a device. */
+#include "support.h"
+
+static void curve_visits_every_cell_stepping_to_neighbours(void **state) {
+    (void)state;
+    for (unsigned bits = 1; bits <= 5; ++bits) {
+        const uint32_t side = 1u << bits;
+        const size_t cells = (size_t)side * side * side;
+        uint32_t(*const at)[3] = test_alloc(cells, sizeof *at);
+        bool *const seen = test_alloc(cells, sizeof *seen);
+        for (uint32_t z = 0; z < side; ++z)
+            for (uint32_t y = 0; y < side; ++y)
+                for (uint32_t x = 0; x < side; ++x) {
+                    const uint64_t index = ov_hilbert_index(x, y, z, bits);
+                    assert_true(index < cells);
+                    assert_false(seen[index]);
+                    seen[index] = true;
+                    at[index][0] = x;
+                    at[index][1] = y;
+                    at[index][2] = z;
+                }
+        for (size_t k = 1; k < cells; ++k) {
+            int way = 0;
+            for (int axis = 0; axis < 3; ++axis)
+                way += abs((int)at[k][axis] - (int)at[k - 1][axis]);
+            assert_int_equal(way, 1);
+        }
+        free(at);
+        free(seen);
+    }
+}
+
+static void curve_uses_all_its_bits(void **state) {
+    (void)state;
+    for (unsigned bits = 1; bits <= 21; ++bits) {
+        const uint32_t last = (uint32_t)((1ull << bits) - 1);
+        uint64_t index[4] = {ov_hilbert_index(0, 0, 0, bits), ov_hilbert_index(last, 0, 0, bits),
+                             ov_hilbert_index(0, last, 0, bits),
+                             ov_hilbert_index(0, 0, last, bits)};
+        const uint64_t end = 1ull << (3 * bits);
+        int ends = 0;
+        for (int k = 0; k < 4; ++k) {
+            assert_true(index[k] < end);
+            ends += index[k] == 0 || index[k] == end - 1;
+        }
+        assert_int_equal(ends, 2); /* the curve runs along one edge of the cube */
+    }
+}
+
+/* ---- sort --------------------------------------------------------------------------------- */
+
+static void expect_sorted(ovoid_context *context, const uint64_t *keys, size_t count) {
+    uint32_t *const order = test_alloc(count, sizeof *order);
+    bool *const seen = test_alloc(count, sizeof *seen);
+    test_check(context, ov_sort_keys(context, keys, count, order));
+    for (size_t k = 0; k < count; ++k) {
+        assert_true(order[k] < count);
+        assert_false(seen[order[k]]);
+        seen[order[k]] = true;
+        if (k > 0) {
+            assert_true(keys[order[k - 1]] <= keys[order[k]]);
+            if (keys[order[k - 1]] == keys[order[k]])
+                assert_true(order[k - 1] < order[k]); /* stable */
+        }
+    }
+    free(order);
+    free(seen);
+}
+
+static void sort_orders_keys_of_every_width(void **state) {
+    enum { COUNT = 5000 };
+    test_random random = {1};
+    uint64_t *const keys = test_alloc(COUNT, sizeof *keys);
+    for (unsigned width = 1; width <= 64; ++width) {
+        for (size_t k = 0; k < COUNT; ++k)
+            keys[k] = random_bits(&random) >> (64 - width);
+        expect_sorted(*state, keys, COUNT);
+    }
+    free(keys);
+}
+
+static void sort_takes_small_and_equal_keys(void **state) {
+    uint64_t keys[100] = {0};
+    for (size_t count = 0; count <= 3; ++count) {
+        for (size_t k = 0; k < count; ++k)
+            keys[k] = UINT64_MAX - k;
+        expect_sorted(*state, keys, count);
+    }
+    for (size_t k = 0; k < 100; ++k)
+        keys[k] = 42;
+    expect_sorted(*state, keys, 100);
+    memset(keys, 0, sizeof keys);
+    expect_sorted(*state, keys, 100);
+}
+
+/* ---- tree --------------------------------------------------------------------------------- */
+
+static void box_of(const float *boxes, const ov_tree *tree, unsigned level, size_t box,
+                   float value[6]) {
+    const size_t group = tree->groups[level] + box / OV_GROUP;
+    for (size_t k = 0; k < 6; ++k)
+        value[k] = boxes[group * 6 * OV_GROUP + k * OV_GROUP + box % OV_GROUP];
+}
+
+/* Every box is exactly the hull of its children, level 0 holds the leaves, and what fills up a
+ * group is empty. */
+static void expect_tree(ovoid_context *context, size_t count, uint64_t seed) {
+    test_random random = {seed};
+    float *const leaves = test_alloc(6 * count, sizeof *leaves), *boxes = NULL;
+    size_t floats = 0;
+    ov_tree tree;
+    for (size_t k = 0; k < count; ++k)
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const double low = random_uniform(&random, -100.0, 100.0);
+            leaves[6 * k + axis] = (float)low;
+            leaves[6 * k + axis + 3] = (float)(low + random_uniform(&random, 0.0, 5.0));
+        }
+    test_check(context, ov_tree_build(context, leaves, count, &tree, &boxes, &floats));
+    size_t expected = count, groups = 0;
+    for (unsigned level = 0; level < tree.levels; ++level) {
+        const size_t used = (expected + OV_GROUP - 1) / OV_GROUP;
+        assert_int_equal(tree.boxes[level], expected);
+        assert_int_equal(tree.groups[level], groups);
+        for (size_t b = 0; b < used * OV_GROUP; ++b) {
+            float box[6], hull[6] = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
+            box_of(boxes, &tree, level, b, box);
+            if (b >= expected) {
+                assert_true(box[0] > box[3]);
+                continue;
+            }
+            if (level == 0) {
+                assert_memory_equal(box, leaves + 6 * b, sizeof box);
+                continue;
+            }
+            for (size_t c = b * OV_GROUP; c < (b + 1) * OV_GROUP && c < tree.boxes[level - 1];
+                 ++c) {
+                float child[6];
+                box_of(boxes, &tree, level - 1, c, child);
+                for (int k = 0; k < 3; ++k) {
+                    hull[k] = fminf(hull[k], child[k]);
+                    hull[k + 3] = fmaxf(hull[k + 3], child[k + 3]);
+                }
+            }
+            assert_memory_equal(box, hull, sizeof box);
+        }
+        groups += used;
+        expected = used;
+    }
+    assert_int_equal(floats, groups * OV_GROUP * 6);
+    if (count > 0) /* the last level is one group */
+        assert_true(tree.boxes[tree.levels - 1] <= OV_GROUP);
+    else
+        assert_int_equal(tree.levels, 0);
+    free(boxes);
+    free(leaves);
+}
+
+static void tree_contains_its_leaves(void **state) {
+    const size_t counts[] = {0, 1, 15, 16, 17, 255, 256, 257, 4096, 4097, 70000};
+    for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n)
+        expect_tree(*state, counts[n], n);
+}
+
+static void tree_has_a_limit(void **state) {
+    ov_tree tree;
+    float *boxes = NULL;
+    size_t floats = 0;
+    test_refused(
+        *state,
+        ov_tree_build(*state, NULL, ((size_t)1 << (4 * OV_LEVELS)) + 1, &tree, &boxes, &floats),
+        OVOID_ERROR_LIMIT, "boxes");
+    assert_null(boxes);
+}
+
+/* ---- packs -------------------------------------------------------------------------------- */
+
+/* The packs hold each point once, in `order`, bit for bit; the fill repeats the last point; the
+ * leaf boxes are the packs' hulls. Returns the mean diagonal of the boxes. */
+static double expect_packs(ovoid_context *context, const float *xyz, size_t count,
+                           double resolution) {
+    const double origin[3] = {1.0, 2.0, 3.0};
+    ov_points points = {0};
+    test_check(context, ov_points_create(context, xyz, count, origin, resolution, &points));
+    assert_int_equal(points.count, count);
+    assert_int_equal(points.packs, (count + OV_PACK - 1) / OV_PACK);
+    assert_memory_equal(points.origin, origin, sizeof origin);
+    bool *const seen = test_alloc(count, sizeof *seen);
+    for (size_t k = 0; k < count; ++k) {
+        assert_true(points.order[k] < count);
+        assert_false(seen[points.order[k]]);
+        seen[points.order[k]] = true;
+    }
+    free(seen);
+    size_t groups = 0;
+    for (unsigned level = 0; level < points.tree.levels; ++level)
+        groups += (points.tree.boxes[level] + OV_GROUP - 1) / OV_GROUP;
+    float *const packed = read_floats(context, &points.xyz, points.packs * 3 * OV_PACK);
+    float *const boxes = read_floats(context, &points.boxes, groups * OV_GROUP * 6);
+    double diagonals = 0.0;
+    for (size_t pack = 0; pack < points.packs; ++pack) {
+        float box[6], hull[6] = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
+        for (size_t j = 0; j < OV_PACK; ++j) {
+            const size_t k = pack * OV_PACK + j;
+            const float *const p = xyz + 3 * (size_t)points.order[k < count ? k : count - 1];
+            for (size_t axis = 0; axis < 3; ++axis) {
+                assert_true(packed[pack * 3 * OV_PACK + axis * OV_PACK + j] == p[axis]);
+                hull[axis] = fminf(hull[axis], p[axis]);
+                hull[axis + 3] = fmaxf(hull[axis + 3], p[axis]);
+            }
+        }
+        box_of(boxes, &points.tree, 0, pack, box);
+        double square = 0.0;
+        for (int k = 0; k < 6; ++k)
+            assert_true(box[k] == hull[k]);
+        for (int k = 0; k < 3; ++k)
+            square += (hull[k + 3] - hull[k]) * (hull[k + 3] - hull[k]);
+        diagonals += sqrt(square);
+    }
+    const double mean = points.packs > 0 ? diagonals / (double)points.packs : 0.0;
+    free(packed);
+    free(boxes);
+    ov_points_destroy(&points);
+    ov_points_destroy(&points);
+    return mean;
+}
+
+static void packs_hold_every_point_once(void **state) {
+    const size_t counts[] = {0, 1, 31, 32, 33, 512, 513, 5000};
+    for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n) {
+        test_random random = {n};
+        float *const xyz = random_points(&random, counts[n], 10.0);
+        expect_packs(*state, xyz, counts[n], 0.5);
+        free(xyz);
+    }
+}
+
+/* The point of the curve: 32 consecutive points of a lattice lie together. A brick of 4 x 4 x 2 has
+ * a diagonal of 4.4 steps, a row of 32 has 31. */
+static void packs_are_compact(void **state) {
+    enum { SIDE = 20 };
+    float *const xyz = test_alloc(3 * SIDE * SIDE * SIDE, sizeof *xyz);
+    for (size_t k = 0; k < SIDE * SIDE * SIDE; ++k) {
+        xyz[3 * k] = (float)(k % SIDE);
+        xyz[3 * k + 1] = (float)(k / SIDE % SIDE);
+        xyz[3 * k + 2] = (float)(k / (SIDE * SIDE));
+    }
+    const double mean = expect_packs(*state, xyz, SIDE * SIDE * SIDE, 1.0);
+    print_message("mean diagonal of a pack: %.2f steps\n", mean);
+    assert_true(mean < 6.5);
+    free(xyz);
+}
+
+static void coincident_points(void **state) {
+    enum { COUNT = 100 };
+    float xyz[3 * COUNT];
+    for (int k = 0; k < 3 * COUNT; ++k)
+        xyz[k] = (float)(k % 3) - 0.7f;
+    expect_packs(*state, xyz, COUNT, 0.5);
+    expect_packs(*state, xyz, COUNT, 0.0); /* the step of a lattice that is one point */
+}
+
+/* Far coordinates, a spread that the curve's bits cannot resolve, flat and straight sets. */
+static void odd_extents(void **state) {
+    enum { COUNT = 300 };
+    test_random random = {5};
+    float *const xyz = random_points(&random, COUNT, 5.0);
+    for (size_t k = 0; k < COUNT; ++k)
+        xyz[3 * k] += 1e6f;
+    expect_packs(*state, xyz, COUNT, 0.5);
+    for (size_t k = 0; k < COUNT; ++k)
+        xyz[3 * k] = k % 2 ? 1e12f : -1e12f;
+    expect_packs(*state, xyz, COUNT, 0.5);
+    for (size_t k = 0; k < COUNT; ++k)
+        xyz[3 * k] = 0.0f;
+    expect_packs(*state, xyz, COUNT, 0.5);
+    for (size_t k = 0; k < COUNT; ++k)
+        xyz[3 * k + 1] = -3.0f;
+    expect_packs(*state, xyz, COUNT, 0.5);
+    free(xyz);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(curve_visits_every_cell_stepping_to_neighbours),
+        cmocka_unit_test(curve_uses_all_its_bits),
+        cmocka_unit_test(sort_orders_keys_of_every_width),
+        cmocka_unit_test(sort_takes_small_and_equal_keys),
+        cmocka_unit_test(tree_contains_its_leaves),
+        cmocka_unit_test(tree_has_a_limit),
+        cmocka_unit_test(packs_hold_every_point_once),
+        cmocka_unit_test(packs_are_compact),
+        cmocka_unit_test(coincident_points),
+        cmocka_unit_test(odd_extents),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -1,0 +1,297 @@
+/*
+ * The constrained points against a brute-force selection in double: every point of the paper's
+ * lattice, every atom.
+ */
+#include "support.h"
+
+static const ov_sampling no_questions = {0};
+
+typedef struct job {
+    const double *xyzr;
+    size_t atoms;
+    double decay, spacing, padding;
+    ov_band band;
+} job;
+
+/* phi may differ from the device's by this much: the cut-off, and positions rounded to float. */
+static double tolerance_at(const job *j, const ov_lattice *lattice, const double y[3], double *phi,
+                           reference_sum gradient[3]) {
+    double extent = 0.0, slope = 0.0;
+    ov_quadric *const quadrics = test_alloc(j->atoms, sizeof *quadrics);
+    for (size_t i = 0; i < j->atoms; ++i)
+        ov_quadric_of_atom(j->xyzr + 4 * i, j->decay, &quadrics[i]);
+    const reference_sum field = reference_field(quadrics, j->atoms, y);
+    reference_gradient(quadrics, j->atoms, y, gradient);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        extent = fmax(extent, lattice->step[axis] * (double)lattice->size[axis]);
+        slope += gradient[axis].scale;
+    }
+    free(quadrics);
+    *phi = field.value;
+    return FLT_EPSILON * (3.0 * field.scale + extent * slope) + 1e-7 * (double)j->atoms;
+}
+
+/* Lattice index of a sampled position; fails where it is not on the lattice. */
+static size_t index_of(const ov_lattice *lattice, const double y[3]) {
+    size_t index = 0;
+    for (size_t axis = 3; axis-- > 0;) {
+        const double step = lattice->step[axis];
+        const double extent = step * (double)lattice->size[axis];
+        const double i = step > 0.0 ? round((y[axis] - lattice->low[axis]) / step) : 1.0;
+        assert_true(i >= 1.0 && i <= (double)lattice->size[axis]);
+        expect_near(y[axis], lattice->low[axis] + i * step, 1e-6 * (1.0 + extent),
+                    "a lattice coordinate");
+        index = index * (size_t)lattice->size[axis] + (size_t)i - 1;
+    }
+    return index;
+}
+
+static void position(const ov_lattice *lattice, size_t index, double y[3]) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const size_t size = (size_t)lattice->size[axis];
+        y[axis] = lattice->low[axis] + (double)(index % size + 1) * lattice->step[axis];
+        index /= size;
+    }
+}
+
+/* x_i = a + i (b - a) / N_x with N_x = ceil((b - a) / spacing), at least 1. */
+static void expect_lattice(const job *j, const ov_lattice *lattice) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+        double a = INFINITY, b = -INFINITY;
+        for (size_t i = 0; i < j->atoms; ++i) {
+            a = fmin(a, j->xyzr[4 * i + axis] - j->padding);
+            b = fmax(b, j->xyzr[4 * i + axis] + j->padding);
+        }
+        const double n = fmax(1.0, ceil((b - a) / j->spacing - 1e-9));
+        assert_true((double)lattice->size[axis] == n);
+        expect_near(lattice->low[axis], a, 1e-12 * (1.0 + fabs(a)), "a side of the lattice");
+        expect_near(lattice->step[axis], (b - a) / n, 1e-12, "a step of the lattice");
+    }
+}
+
+/* The samples are the band of the lattice, each with its phi and gradient. Returns their number. */
+static size_t expect_samples(ovoid_context *context, const job *j) {
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    test_check(context,
+               ov_lattice_create(context, j->xyzr, j->atoms, j->spacing, j->padding, &lattice));
+    expect_lattice(j, &lattice);
+    test_check(context, ov_sample(context, j->xyzr, j->atoms, j->decay, &lattice, j->band,
+                                  no_questions, &samples));
+    const ov_points *const points = &samples.points;
+    const size_t all = (size_t)(lattice.size[0] * lattice.size[1] * lattice.size[2]);
+    bool *const kept = test_alloc(all, sizeof *kept);
+    float *const packed = read_floats(context, &points->xyz, points->packs * 3 * OV_PACK);
+    float *const value = read_floats(context, &samples.value, points->packs * OV_PACK);
+    float *const slope = read_floats(context, &samples.gradient, points->packs * 3 * OV_PACK);
+    double phi;
+    reference_sum gradient[3];
+    for (size_t k = 0; k < points->count; ++k) {
+        const size_t at = k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
+        double y[3];
+        for (size_t axis = 0; axis < 3; ++axis)
+            y[axis] = points->origin[axis] + packed[at + axis * OV_PACK];
+        const size_t index = index_of(&lattice, y);
+        assert_false(kept[index]);
+        kept[index] = true;
+        const double tolerance = tolerance_at(j, &lattice, y, &phi, gradient);
+        expect_near(value[k], phi, tolerance, "phi");
+        for (size_t axis = 0; axis < 3; ++axis)
+            expect_near(slope[at + axis * OV_PACK], gradient[axis].value,
+                        20.0 * (tolerance + FLT_EPSILON * gradient[axis].scale),
+                        "a component of phi's gradient");
+    }
+    size_t wanted = 0;
+    for (size_t index = 0; index < all; ++index) {
+        double y[3];
+        position(&lattice, index, y);
+        phi = reference_phi(j->xyzr, j->atoms, j->decay, y);
+        const bool inside = phi >= j->band.low && phi <= j->band.high;
+        wanted += inside;
+        if (inside == kept[index])
+            continue;
+        /* only where rounding decides */
+        const double tolerance = tolerance_at(j, &lattice, y, &phi, gradient);
+        assert_true(fmin(fabs(phi - j->band.low), fabs(phi - j->band.high)) <= tolerance);
+    }
+    const size_t count = points->count;
+    print_message("%zu of %zu lattice points kept, %zu wanted\n", count, all, wanted);
+    free(kept);
+    free(packed);
+    free(value);
+    free(slope);
+    ov_samples_destroy(&samples);
+    ov_samples_destroy(&samples);
+    return count;
+}
+
+static void random_atoms(test_random *random, double *xyzr, size_t atoms, const double half[3]) {
+    for (size_t i = 0; i < atoms; ++i) {
+        for (size_t k = 0; k < 3; ++k)
+            xyzr[4 * i + k] = random_uniform(random, -half[k], half[k]);
+        xyzr[4 * i + 3] = random_uniform(random, 1.0, 2.0);
+    }
+}
+
+enum { ATOMS = 12 };
+
+static void small_molecule(void **state) {
+    double xyzr[4 * ATOMS];
+    test_random random = {1};
+    random_atoms(&random, xyzr, ATOMS, (const double[3]){3.0, 2.0, 2.5});
+    job j = {.xyzr = xyzr, .atoms = ATOMS, .decay = 0.5, .spacing = 0.7, .padding = 2.0};
+    const ov_band bands[] = {{0.0, 2.0}, {0.02, 2.0}, {0.5, 2.5}, {-0.5, 1.5}};
+    size_t count[4];
+    for (size_t n = 0; n < 4; ++n) {
+        j.band = bands[n];
+        count[n] = expect_samples(*state, &j);
+    }
+    assert_true(count[1] < count[0] && count[0] > count[3]);
+    j.decay = 0.9;
+    j.spacing = 1.3;
+    j.padding = 0.0;
+    expect_samples(*state, &j);
+}
+
+/* With c = 1 the band reaches down to 0, and every exterior point belongs to it. */
+static void exterior_points_are_kept(void **state) {
+    const double xyzr[4] = {0.3, 0.2, -0.1, 1.5};
+    const double far = test_size(12, 9);
+    const job j = {
+        .xyzr = xyzr, .atoms = 1, .decay = 0.5, .spacing = 1.0, .padding = far, .band = {0.0, 2.0}};
+    const job shell = {.xyzr = xyzr,
+                       .atoms = 1,
+                       .decay = 0.5,
+                       .spacing = 1.0,
+                       .padding = far,
+                       .band = {1e-6, 2.0}};
+    const size_t all = expect_samples(*state, &j), near = expect_samples(*state, &shell);
+    assert_true(all > 2 * near);
+}
+
+/* More than 128 points along x and more than 64 along z: the lattice is evaluated in pieces, some
+ * of them without any atom in reach. */
+static void lattice_of_several_pieces(void **state) {
+    const double half[3] = {test_size(45, 32), 2.0, test_size(21, 16)};
+    double xyzr[4 * ATOMS];
+    test_random random = {2};
+    random_atoms(&random, xyzr, ATOMS, half);
+    for (size_t k = 0; k < 3; ++k) { /* the corners, so that the extent is known */
+        xyzr[k] = -half[k];
+        xyzr[4 + k] = half[k];
+    }
+    job j = {.xyzr = xyzr,
+             .atoms = ATOMS,
+             .decay = 0.5,
+             .spacing = 0.5,
+             .padding = 1.0,
+             .band = {0.02, 2.0}};
+    ov_lattice lattice;
+    test_check(*state, ov_lattice_create(*state, xyzr, ATOMS, j.spacing, j.padding, &lattice));
+    assert_true(lattice.size[0] > 128 && lattice.size[2] > 64);
+    expect_samples(*state, &j);
+    if (!test_small()) {
+        j.band.low = 0.0;
+        expect_samples(*state, &j);
+    }
+}
+
+static void odd_molecules(void **state) {
+    const double one[] = {1.0, 2.0, 3.0, 1.7};
+    const double bare[] = {0.0, 0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.2};
+    const double coincident[] = {1.0, 1.0, 1.0, 1.5, 1.0, 1.0, 1.0, 1.5, 1.0, 1.0, 1.0, 1.5};
+    const double flat[] = {0.0, 0.0, 5.0, 1.5, 2.0, 1.0, 5.0, 1.6, -1.0, 3.0, 5.0, 1.4};
+    const double straight[] = {0.0, 7.0, 5.0, 1.5, 2.5, 7.0, 5.0, 1.6, 6.0, 7.0, 5.0, 1.4};
+    const double far[] = {1e5, -2e5, 3e4, 1.5, 1e5 + 2.0, -2e5 - 1.0, 3e4 + 1.0, 1.7};
+    const job jobs[] = {
+        {one, 1, 0.5, 0.6, 3.0, {0.0, 2.0}},        {one, 1, 0.3, 0.6, 3.0, {0.02, 2.0}},
+        {bare, 3, 0.5, 0.5, 2.0, {0.0, 2.0}},       {bare, 1, 0.5, 0.5, 0.0, {0.0, 2.0}},
+        {coincident, 3, 0.5, 0.6, 3.5, {0.0, 2.0}}, {flat, 3, 0.5, 0.4, 0.0, {0.0, 2.0}},
+        {straight, 3, 0.5, 0.1, 0.0, {0.0, 2.0}},   {far, 2, 0.5, 0.6, 3.0, {0.0, 2.0}},
+        {one, 1, 0.5, 50.0, 3.0, {0.0, 2.0}},
+    };
+    for (size_t n = 0; n < sizeof jobs / sizeof jobs[0]; ++n)
+        expect_samples(*state, &jobs[n]);
+}
+
+/* Coincident atoms' phi is that of one, times their number. */
+static void band_follows_the_sum(void **state) {
+    const double two[] = {0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.5};
+    const job one = {two, 1, 0.5, 0.5, 3.0, {0.5, 1.1}}, both = {two, 2, 0.5, 0.5, 3.0, {1.0, 2.2}};
+    assert_int_equal(expect_samples(*state, &one), expect_samples(*state, &both));
+}
+
+static void empty_band_is_an_error(void **state) {
+    const double xyzr[4] = {0.0, 0.0, 0.0, 2.0};
+    const ov_band band = {0.0, 2.0}; /* phi at the only lattice point is e^2 */
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    test_check(*state, ov_lattice_create(*state, xyzr, 1, 0.5, 0.0, &lattice));
+    assert_int_equal(lattice.size[0] * lattice.size[1] * lattice.size[2], 1);
+    test_refused(*state, ov_sample(*state, xyzr, 1, 0.5, &lattice, band, no_questions, &samples),
+                 OVOID_ERROR_EMPTY, "no lattice point");
+    assert_null(samples.points.order);
+    assert_null(samples.value.memory);
+}
+
+/* Two atoms ten thousand angstrom apart: the space between costs nothing where the band ends above
+ * 0, and is refused, before memory runs out, where it does not. */
+static void empty_space_between_atoms(void **state) {
+    const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 5000.0, 300.0, 300.0, 1.7};
+    const ov_band shell = {0.02, 2.0}, everything = {0.0, 2.0};
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    if (test_small())
+        skip();
+    test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.5, 3.0, &lattice));
+    test_check(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, shell, no_questions, &samples));
+    const job one = {xyzr, 1, 0.5, 0.5, 3.0, {0.02, 2.0}};
+    const size_t single = expect_samples(*state, &one);
+    /* the steps differ a little from 0.5, and so does the number of points about an atom */
+    assert_true(samples.points.count > 1.9 * (double)single &&
+                samples.points.count < 2.1 * (double)single);
+    ov_samples_destroy(&samples);
+    test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.1, 3.0, &lattice));
+    test_refused(*state,
+                 ov_sample(*state, xyzr, 2, 0.5, &lattice, everything, no_questions, &samples),
+                 OVOID_ERROR_LIMIT, "constrained points");
+    test_refused(*state, ov_lattice_create(*state, xyzr, 2, 1e-3, 3.0, &lattice), OVOID_ERROR_LIMIT,
+                 "1e12");
+}
+
+/* Counts the questions in *user; says stop to the third. */
+static bool stop_at_third(uint64_t points, void *user) {
+    uint64_t *const asked = user;
+    (void)points;
+    return ++*asked < 3;
+}
+
+/* Sampling can be stopped between pieces, and leaves nothing behind. */
+static void sampling_can_be_stopped(void **state) {
+    const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
+    uint64_t asked = 0;
+    const ov_sampling sampling = {stop_at_third, &asked};
+    const ov_band band = {0.0, 2.0};
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.6, 1.0, &lattice));
+    assert_true(lattice.size[2] > 2 * 64); /* at least three pieces */
+    test_refused(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, band, sampling, &samples),
+                 OVOID_ERROR_CANCELLED, "");
+    assert_int_equal(asked, 3);
+    assert_null(samples.points.order);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(small_molecule),
+        cmocka_unit_test(exterior_points_are_kept),
+        cmocka_unit_test(lattice_of_several_pieces),
+        cmocka_unit_test(odd_molecules),
+        cmocka_unit_test(band_follows_the_sum),
+        cmocka_unit_test(empty_band_is_an_error),
+        cmocka_unit_test(empty_space_between_atoms),
+        cmocka_unit_test(sampling_can_be_stopped),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -78,9 +78,10 @@ OVOID_API const ovoid_component *ovoid_mesh_component(const ovoid_mesh *mesh, si
 OVOID_API double ovoid_mesh_area(const ovoid_mesh *mesh);
 OVOID_API double ovoid_mesh_volume(const ovoid_mesh *mesh);
 
-/* The same of the smooth surface that the vertices and their normals lie on: each triangle is given
- * the quadratic height that its normals ask for (sagitta of edge ij: (p_j - p_i) . (n_j - n_i) /
- * 8), which leaves an error of fourth order in the spacing. For exact vertices. */
+/* The same of the smooth surface that the vertices and their normals lie on: each edge is bent to the
+ * height that its ends' normals ask for (sagitta of edge ij: (p_j - p_i) . (n_j - n_i) / 8), each
+ * triangle to the quadratic patch through its three edges. The error is of fourth order in the
+ * spacing. For exact vertices. */
 OVOID_API double ovoid_mesh_smooth_area(const ovoid_mesh *mesh);
 OVOID_API double ovoid_mesh_smooth_volume(const ovoid_mesh *mesh);
 

@@ -62,24 +62,30 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
                              const ov_tree tree, __global const float *restrict boxes,
                              const float skin, const uint fill, __global uint *restrict count,
                              __global const uint *restrict start, __global uint *restrict item) {
+    /* A copy, made where all work-items still run together: Mesa's compiler does not look up kernel
+     * arguments by an index that differs between them. */
+    const int levels = (int)tree.levels;
+    uint first_group[OV_LEVELS];
+    for (uint l = 0; l < OV_LEVELS; ++l)
+        first_group[l] = tree.groups[l];
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
     const ov_term t = terms[index];
     uint found = 0;
     uint at = fill ? start[index] : 0;
-    if (t.reach >= 0.0f && tree.levels > 0) {
+    if (t.reach >= 0.0f && levels > 0) {
         /* Depth first: pending[l] has a bit for each box of the current group of level l that is
          * still to be visited. */
         uint pending[OV_LEVELS];
         uint group[OV_LEVELS];
         int hit[OV_GROUP];
-        int level = (int)tree.levels - 1;
+        int level = levels - 1;
         group[level] = 0;
         bool fresh = true;
-        while (level < (int)tree.levels) {
+        while (level < levels) {
             if (fresh) {
-                const size_t g = tree.groups[level] + group[level];
+                const size_t g = first_group[level] + group[level];
                 ov_test_group(t, boxes + g * (6 * OV_GROUP), skin, hit);
                 uint bits = 0;
                 for (uint j = 0; j < OV_GROUP; ++j)

@@ -7,13 +7,21 @@
  * moments: OV_MONOMIALS pairs (high, low) per term; the sum is high + low. Floats are summed over a
  * few thousand points and then added to a two-float total, so no device needs double precision.
  *
- * One term per OV_LANES work-items. u e is computed for a tile of packs first and the ten sums in a
- * second loop: one fused loop needs more registers than there are.
+ * On CPUs one work-item per term: u e is computed for a tile of packs first and the ten sums in a
+ * second loop, since one fused loop needs more registers than there are. On GPUs a team of OV_TEAM
+ * work-items per term takes several packs at a time, and a tile is one point per work-item.
  */
 
-#define OV_TILE_PACKS 16
-#define OV_TILE (OV_TILE_PACKS * OV_VECTORS)
-#define OV_FLUSH_TILES 8
+#if OV_LANES == 1
+#define OV_SHARERS 1 /* work-items per term */
+#define OV_TILE_PACKS 32
+#else
+#define OV_SHARERS OV_TEAM
+#define OV_TILE_PACKS OV_PACKS_AT_ONCE
+#endif
+#define OV_PACKS_AT_ONCE (OV_SHARERS / OV_LANES)
+#define OV_TILE (OV_TILE_PACKS / OV_PACKS_AT_ONCE * OV_VECTORS)
+#define OV_FLUSH_TILES (256 / OV_TILE_PACKS)
 
 /* high + low += value, error free (Knuth's two-sum). */
 static inline void ov_add(ov_vec *high, ov_vec *low, ov_vec value) {
@@ -66,7 +74,7 @@ static inline void ov_sum(ov_vec high, ov_vec low, float *high_sum, float *low_s
 #endif
 }
 
-#if OV_LANES > 1
+#if OV_SHARERS > 1
 static inline void ov_add_scalar(float *high, float *low, float value) {
     const float sum = *high + value;
     const float part = sum - *high;
@@ -74,9 +82,9 @@ static inline void ov_add_scalar(float *high, float *low, float value) {
     *high = sum;
 }
 
-/* Adds up the lanes' pairs in a fixed order; lane 0 holds the result. */
-static inline void ov_add_lanes(float *high, float *low, uint lane, __local float *scratch) {
-    for (uint width = OV_LANES / 2; width > 0; width /= 2) {
+/* Adds up the team's pairs in a fixed order; sharer 0 holds the result. */
+static inline void ov_add_team(float *high, float *low, uint lane, __local float *scratch) {
+    for (uint width = OV_SHARERS / 2; width > 0; width /= 2) {
         scratch[2 * lane] = *high;
         scratch[2 * lane + 1] = *low;
         barrier(CLK_LOCAL_MEM_FENCE);
@@ -93,12 +101,13 @@ __kernel void moments(const uint count, __global const float *restrict points,
                       __global const float *restrict u, __global const uint *restrict start,
                       __global const uint *restrict item, __global const ov_term *restrict terms,
                       __global float *restrict result) {
-    const uint index = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
-#if OV_LANES == 1
+    const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
+    const uint lane = sharer % OV_LANES;
+#if OV_SHARERS == 1
     if (index >= count)
         return;
 #endif
-    /* with several lanes a group is exactly one term, so all of it takes part in the barriers */
+    /* otherwise a group is exactly one term, and all of it takes part in the barriers */
     const ov_term t = terms[index];
     ov_vec total[OV_MONOMIALS], rest[OV_MONOMIALS], sum[OV_MONOMIALS];
 #pragma unroll
@@ -110,7 +119,7 @@ __kernel void moments(const uint count, __global const float *restrict points,
     for (uint first = start[index]; first < end; first += OV_TILE_PACKS) {
         const uint packs = min((uint)OV_TILE_PACKS, end - first);
         ov_vec ue[OV_TILE];
-        for (uint k = 0; k < packs; ++k) {
+        for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n) {
             const size_t pack = item[first + k];
             __global const float *const p = points + pack * (3 * OV_PACK);
 #pragma unroll
@@ -118,10 +127,10 @@ __kernel void moments(const uint count, __global const float *restrict points,
                 const uint at = v * OV_LANES + lane;
                 const ov_vec x = OV_LOAD(at, p) - t.x, y = OV_LOAD(at, p + OV_PACK) - t.y,
                              z = OV_LOAD(at, p + 2 * OV_PACK) - t.z;
-                ue[k * OV_VECTORS + v] = OV_LOAD(at, u + pack * OV_PACK) * ov_value(t, x, y, z);
+                ue[n * OV_VECTORS + v] = OV_LOAD(at, u + pack * OV_PACK) * ov_value(t, x, y, z);
             }
         }
-        for (uint k = 0; k < packs; ++k) {
+        for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n) {
             const size_t pack = item[first + k];
             __global const float *const p = points + pack * (3 * OV_PACK);
 #pragma unroll
@@ -129,7 +138,7 @@ __kernel void moments(const uint count, __global const float *restrict points,
                 const uint at = v * OV_LANES + lane;
                 const ov_vec x = OV_LOAD(at, p) - t.x, y = OV_LOAD(at, p + OV_PACK) - t.y,
                              z = OV_LOAD(at, p + 2 * OV_PACK) - t.z;
-                const ov_vec e = ue[k * OV_VECTORS + v];
+                const ov_vec e = ue[n * OV_VECTORS + v];
                 const ov_vec ex = e * x, ey = e * y, ez = e * z;
                 sum[0] += e;
                 sum[1] += ex;
@@ -153,17 +162,17 @@ __kernel void moments(const uint count, __global const float *restrict points,
         }
     }
 
-#if OV_LANES > 1
-    __local float scratch[2 * OV_LANES];
+#if OV_SHARERS > 1
+    __local float scratch[2 * OV_SHARERS];
 #endif
 #pragma unroll
     for (uint m = 0; m < OV_MONOMIALS; ++m) {
         ov_add(&total[m], &rest[m], sum[m]);
         float high, low;
         ov_sum(total[m], rest[m], &high, &low);
-#if OV_LANES > 1
-        ov_add_lanes(&high, &low, lane, scratch);
-        if (lane == 0)
+#if OV_SHARERS > 1
+        ov_add_team(&high, &low, sharer, scratch);
+        if (sharer == 0)
 #endif
         {
             result[((size_t)index * OV_MONOMIALS + m) * 2] = high;

@@ -226,7 +226,7 @@ static double expect_packs(ovoid_context *context, const float *xyz, size_t coun
 }
 
 static void packs_hold_every_point_once(void **state) {
-    const size_t counts[] = {0, 1, 31, 32, 33, 512, 513, 5000};
+    const size_t counts[] = {0, 1, 15, 16, 17, 31, 32, 33, 256, 257, 5000};
     for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n) {
         test_random random = {n};
         float *const xyz = random_points(&random, counts[n], 10.0);
@@ -235,8 +235,8 @@ static void packs_hold_every_point_once(void **state) {
     }
 }
 
-/* The point of the curve: 32 consecutive points of a lattice lie together. A brick of 4 x 4 x 2 has
- * a diagonal of 4.4 steps, a row of 32 has 31. */
+/* The point of the curve: 16 consecutive points of a lattice lie together. A brick of 4 x 2 x 2 has
+ * a diagonal of 3.3 steps, a row of 16 has 15. */
 static void packs_are_compact(void **state) {
     enum { SIDE = 20 };
     float *const xyz = test_alloc(3 * SIDE * SIDE * SIDE, sizeof *xyz);
@@ -247,7 +247,7 @@ static void packs_are_compact(void **state) {
     }
     const double mean = expect_packs(*state, xyz, SIDE * SIDE * SIDE, 1.0);
     print_message("mean diagonal of a pack: %.2f steps\n", mean);
-    assert_true(mean < 6.5);
+    assert_true(mean < 4.5);
     free(xyz);
 }
 

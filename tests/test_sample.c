@@ -172,7 +172,7 @@ static void exterior_points_are_kept(void **state) {
 /* More than 128 points along x and more than 64 along z: the lattice is evaluated in pieces, some
  * of them without any atom in reach. */
 static void lattice_of_several_pieces(void **state) {
-    const double half[3] = {test_size(45, 32), 2.0, test_size(21, 16)};
+    const double half[3] = {test_size(45, 32), test_size(2, 0), test_size(21, 16)};
     double xyzr[4 * ATOMS];
     test_random random = {2};
     random_atoms(&random, xyzr, ATOMS, half);

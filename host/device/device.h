@@ -19,7 +19,7 @@ typedef struct ov_shape {
 } ov_shape;
 
 /* Environment variables for development and tests:
- *   OVOID_SHAPE       "VxL", such as 1x32 or 4x1, instead of the device's own shape: V one of 1, 4,
+ *   OVOID_SHAPE       "VxL", such as 1x16 or 4x1, instead of the device's own shape: V one of 1, 4,
  * 8, 16, L a power of two, V * L a divisor of OV_PACK OVOID_KERNEL_DIR  folder with the kernel
  * sources, all of them, instead of the embedded ones OVOID_CACHE       auto (default), on or off:
  * whether compiled programs are kept. auto leaves that to drivers with a cache of their own (PoCL)

@@ -19,24 +19,37 @@ size_t ov_item_group(const ov_device *device) {
     return device->shape.lanes == 1 ? 1 : 64;
 }
 
-/* Packs or terms in a work-group of a CPU: a few, to share what a group costs to start. */
+/* Packs or terms in a work-group of a CPU: a few, to share what a group costs to start. On a GPU a
+ * group has GPU_GROUP work-items. */
 #define CPU_GROUP 4
+#define GPU_GROUP 64
 
-/* `groups` packs or terms, each handled by the shape's lanes: on GPUs as one work-group. */
-static ovoid_status launch_lanes(ovoid_context *context, const ov_kernel *kernel, size_t groups,
+/* `packs` packs, each handled by the shape's lanes. */
+static ovoid_status launch_packs(ovoid_context *context, const ov_kernel *kernel, size_t packs,
                                  const ov_arg *args, size_t arg_count) {
     ov_device *device;
     const ovoid_status status = ov_device_get(context, &device);
     if (status != OVOID_OK)
         return status;
     const size_t lanes = device->shape.lanes;
-    return ov_launch(context, kernel, groups * lanes, lanes == 1 ? CPU_GROUP : lanes, args,
+    return ov_launch(context, kernel, packs * lanes, lanes == 1 ? CPU_GROUP : GPU_GROUP, args,
                      arg_count);
 }
-#define LAUNCH_LANES(context, kernel, groups, ...)                                                 \
-    launch_lanes((context), (kernel), (groups), (const ov_arg[]){__VA_ARGS__},                     \
-                 sizeof((const ov_arg[]){__VA_ARGS__}) / sizeof(ov_arg))
 
+/* `terms` terms, each handled by one work-item or by a team that is a work-group. */
+static ovoid_status launch_terms(ovoid_context *context, const ov_kernel *kernel, size_t terms,
+                                 const ov_arg *args, size_t arg_count) {
+    ov_device *device;
+    const ovoid_status status = ov_device_get(context, &device);
+    if (status != OVOID_OK)
+        return status;
+    return device->shape.lanes == 1
+               ? ov_launch(context, kernel, terms, CPU_GROUP, args, arg_count)
+               : ov_launch(context, kernel, terms * OV_TEAM, OV_TEAM, args, arg_count);
+}
+
+#define ARGS(...)                                                                                  \
+    (const ov_arg[]){__VA_ARGS__}, sizeof((const ov_arg[]){__VA_ARGS__}) / sizeof(ov_arg)
 static ovoid_status reserve_values(ovoid_context *context, const ov_points *points,
                                    ov_buffer *value) {
     return ov_buffer_reserve(context, value, points->packs * OV_PACK * sizeof(cl_float),
@@ -49,10 +62,10 @@ ovoid_status ov_field(ovoid_context *context, ov_operations *operations, const o
     const cl_uint packs = (cl_uint)points->packs;
     OV_TRY(make(context, &operations->field, "field", "field"));
     OV_TRY(reserve_values(context, points, value));
-    OV_TRY(LAUNCH_LANES(context, &operations->field, points->packs, OV_ARG(packs),
-                        OV_ARG(points->xyz.memory), OV_ARG(lists->pack_start.memory),
-                        OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
-                        OV_ARG(value->memory)));
+    OV_TRY(launch_packs(context, &operations->field, points->packs,
+                        ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
+                             OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
+                             OV_ARG(terms->device.memory), OV_ARG(value->memory))));
 cleanup:
     return status;
 }
@@ -65,10 +78,11 @@ ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operatio
     const cl_uint packs = (cl_uint)points->packs;
     OV_TRY(make(context, &operations->field_polynomial, "field", "field_polynomial"));
     OV_TRY(reserve_values(context, points, value));
-    OV_TRY(LAUNCH_LANES(context, &operations->field_polynomial, points->packs, OV_ARG(packs),
-                        OV_ARG(points->xyz.memory), OV_ARG(lists->pack_start.memory),
-                        OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
-                        OV_ARG(polynomial->memory), OV_ARG(value->memory)));
+    OV_TRY(launch_packs(context, &operations->field_polynomial, points->packs,
+                        ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
+                             OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
+                             OV_ARG(terms->device.memory), OV_ARG(polynomial->memory),
+                             OV_ARG(value->memory))));
 cleanup:
     return status;
 }
@@ -82,10 +96,11 @@ ovoid_status ov_field_gradient(ovoid_context *context, ov_operations *operations
     OV_TRY(reserve_values(context, points, value));
     OV_TRY(ov_buffer_reserve(context, gradient, points->packs * 3 * OV_PACK * sizeof(cl_float),
                              "gradients at points"));
-    OV_TRY(LAUNCH_LANES(context, &operations->field_gradient, points->packs, OV_ARG(packs),
-                        OV_ARG(points->xyz.memory), OV_ARG(lists->pack_start.memory),
-                        OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
-                        OV_ARG(value->memory), OV_ARG(gradient->memory)));
+    OV_TRY(launch_packs(context, &operations->field_gradient, points->packs,
+                        ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
+                             OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
+                             OV_ARG(terms->device.memory), OV_ARG(value->memory),
+                             OV_ARG(gradient->memory))));
 cleanup:
     return status;
 }
@@ -98,10 +113,10 @@ ovoid_status ov_moments(ovoid_context *context, ov_operations *operations, const
     OV_TRY(make(context, &operations->moments, "moments", "moments"));
     OV_TRY(ov_buffer_reserve(context, result, terms->count * 2 * OV_MONOMIALS * sizeof(cl_float),
                              "moments"));
-    OV_TRY(LAUNCH_LANES(context, &operations->moments, terms->count, OV_ARG(count),
-                        OV_ARG(points->xyz.memory), OV_ARG(u->memory),
-                        OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
-                        OV_ARG(terms->device.memory), OV_ARG(result->memory)));
+    OV_TRY(launch_terms(context, &operations->moments, terms->count,
+                        ARGS(OV_ARG(count), OV_ARG(points->xyz.memory), OV_ARG(u->memory),
+                             OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
+                             OV_ARG(terms->device.memory), OV_ARG(result->memory))));
 cleanup:
     return status;
 }

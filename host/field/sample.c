@@ -6,7 +6,7 @@
 
 /* A brick of lattice points is one pack. */
 #define BRICK_X 4
-#define BRICK_Y 4
+#define BRICK_Y 2
 #define BRICK_Z 2
 _Static_assert(BRICK_X *BRICK_Y *BRICK_Z == OV_PACK, "a brick is a pack");
 

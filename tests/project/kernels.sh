@@ -15,12 +15,12 @@ status=0
 found=0
 for source in "$folder"/*.cl; do
     found=$((found + 1))
-    for shape in 16x1 8x1 4x1 1x32; do
+    for shape in 16x1 8x1 4x1 1x16; do
         for file in shared.h vector.clh "$(basename "$source")"; do
             printf '#line 1 "%s/%s"\n' "$folder" "$file"
             cat "$folder/$file"
         done | "$clang" -target spir64 -x cl -cl-std=CL1.2 -Xclang -finclude-default-header \
-            -fsyntax-only -Wall -Wno-unused-function -Werror -DOV_PACK=32 -DOV_VECTOR="${shape%x*}" \
+            -fsyntax-only -Wall -Wno-unused-function -Werror -DOV_PACK=16 -DOV_VECTOR="${shape%x*}" \
             -DOV_LANES="${shape#*x}" - || {
             echo "$source fails in shape $shape"
             status=1

@@ -25,6 +25,10 @@ typedef float ov_f32;
 /* Monomials of degree up to 2 in z = y - centre: 1, x, y, z, xx, xy, xz, yy, yz, zz. */
 #define OV_MONOMIALS 10
 
+/* Triangles in a leaf of the tree over a mesh, and floats of each (kernels/distance.cl). */
+#define OV_LEAF 16
+#define OV_TRIANGLE 18
+
 /* One ellipsoid as the kernels see it: 2^(log2_amplitude - q(z)), q(z) = z^T A z with A already
  * multiplied by log2(e). Coordinates are relative to the points' origin, in angstrom. */
 typedef struct ov_term {

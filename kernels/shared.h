@@ -19,6 +19,10 @@ typedef float ov_f32;
 #define OV_PACK 16
 /* Work-items that share a term where packs have several lanes: one warp. */
 #define OV_TEAM 32
+/* Lattice points in bricks are packs: x runs fastest. */
+#define OV_BRICK_X 4
+#define OV_BRICK_Y 2
+#define OV_BRICK_Z 2
 /* Boxes in a group of the tree over packs or terms, and levels of that tree (16^7 leaves). */
 #define OV_GROUP 16
 #define OV_LEVELS 7

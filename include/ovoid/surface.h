@@ -78,9 +78,9 @@ OVOID_API const ovoid_component *ovoid_mesh_component(const ovoid_mesh *mesh, si
 OVOID_API double ovoid_mesh_area(const ovoid_mesh *mesh);
 OVOID_API double ovoid_mesh_volume(const ovoid_mesh *mesh);
 
-/* The same of the smooth surface that the vertices and their normals lie on: each edge is bent to the
- * height that its ends' normals ask for (sagitta of edge ij: (p_j - p_i) . (n_j - n_i) / 8), each
- * triangle to the quadratic patch through its three edges. The error is of fourth order in the
+/* The same of the smooth surface that the vertices and their normals lie on: each edge is bent to
+ * the height that its ends' normals ask for (sagitta of edge ij: (p_j - p_i) . (n_j - n_i) / 8),
+ * each triangle to the quadratic patch through its three edges. The error is of fourth order in the
  * spacing. For exact vertices. */
 OVOID_API double ovoid_mesh_smooth_area(const ovoid_mesh *mesh);
 OVOID_API double ovoid_mesh_smooth_volume(const ovoid_mesh *mesh);
@@ -142,6 +142,60 @@ OVOID_API void ovoid_measure_options_init(ovoid_measure_options *options);
 OVOID_API ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecule,
                                      const ovoid_model *model, const ovoid_measure_options *options,
                                      ovoid_measures *measures);
+
+/* ---- export ------------------------------------------------------------------------------- */
+
+/* Files for other programs. Ellipsoids, of models alone: */
+typedef enum ovoid_export_format {
+    OVOID_EXPORT_AUTO = 0, /* by the extension */
+    OVOID_EXPORT_BILD,     /* .bild, .bld: ChimeraX, one object of coarse ellipsoids */
+    OVOID_EXPORT_CXC,      /* .cxc: ChimeraX commands, each ellipsoid a smooth surface of its own */
+    OVOID_EXPORT_PYMOL,    /* .py: a script that loads the ellipsoids into PyMOL */
+    OVOID_EXPORT_GMM,      /* .gmm: the Gaussian mixture text of gmconvert and gmfit */
+    OVOID_EXPORT_JSON,     /* .json */
+    /* and the field on a lattice, of models and molecules: */
+    OVOID_EXPORT_CCP4, /* .mrc, .map, .ccp4: MRC2014, 32-bit floats */
+    OVOID_EXPORT_DX    /* .dx: OpenDX text as APBS writes it */
+} ovoid_export_format;
+
+/* Points of a map done so far, of how many. Returns true to go on, false to stop with
+ * OVOID_ERROR_CANCELLED. */
+typedef bool (*ovoid_export_progress_fn)(uint64_t points, uint64_t total, void *user);
+
+typedef struct ovoid_export_options {
+    ovoid_export_format format;
+    /* c. An ellipsoid is drawn where its own Gaussian is c: with semi-axes sqrt(ln(a / c) / d_p).
+     * One that nowhere reaches c (a <= c) is drawn where it has half its amplitude, with semi-axes
+     * sqrt(ln 2 / d_p). A map reaches to where each Gaussian has fallen to c / 100. 0: the model's,
+     * or OVOID_DEFAULT_ISOVALUE of a molecule. */
+    double isovalue;
+    double spacing;                    /* of a map, angstrom; its points are multiples of it */
+    double colour[3];                  /* red, green, blue from 0 to 1, of drawn ellipsoids */
+    double opacity;                    /* from 0 to 1, of drawn ellipsoids */
+    ovoid_export_progress_fn progress; /* may be NULL; maps alone ask it */
+    void *user;
+} ovoid_export_options;
+
+/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue. */
+OVOID_API void ovoid_export_options_init(ovoid_export_options *options);
+
+/* Writes a file for another program, whole or not at all; "-" is standard output and needs a
+ * format. options may be NULL. A map is computed on the device and written piece by piece: memory
+ * does not grow with it. */
+OVOID_API ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model,
+                                          const char *path, const ovoid_export_options *options);
+
+/* As ovoid_model_export(), for the field of a molecule: maps alone. */
+OVOID_API ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
+                                             double decay, const char *path,
+                                             const ovoid_export_options *options);
+
+/* Name of a format as ovoid_export_format_find() takes it, "bild" for example; NULL for others. */
+OVOID_API const char *ovoid_export_format_name(ovoid_export_format format);
+
+/* The format of a name or of an extension with its dot, in any case of letters; AUTO when there is
+ * none. */
+OVOID_API ovoid_export_format ovoid_export_format_find(const char *name);
 
 #ifdef __cplusplus
 }

@@ -19,6 +19,7 @@ typedef struct subcommand {
 static const subcommand subcommands[] = {
     {"fit", "fit a sparse model to a molecule's surface", cli_fit, cli_fit_help},
     {"export", "write a model or a field for another program", cli_export, cli_export_help},
+    {"render", "take a picture of a molecule's and a model's surface", cli_render, cli_render_help},
     {"devices", "list the OpenCL devices", cli_devices, cli_devices_help},
 };
 enum { SUBCOMMANDS = sizeof subcommands / sizeof subcommands[0] };

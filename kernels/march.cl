@@ -11,6 +11,8 @@
  * numbered in that order, by point within each axis, so that any vertex's number follows from its
  * edge. Edges are named as in host/surface/case_table.h: corner + 8 * axis.
  *
+ * The values of phi lie elsewhere: those of a brick in pack place[brick].
+ *
  * The kernels over bricks take several to a work-item where work-items are dear.
  */
 
@@ -87,10 +89,11 @@ static inline uint lowest_bit(uint mask) {
 
 /* sign: bit j set where point j of a brick is inside, phi >= c. All bricks of the padded grid. */
 __kernel void march_signs(const uint bricks, const uint run, const float isovalue,
-                          __global const float *restrict value, __global uint *restrict sign) {
+                          __global const uint *restrict place, __global const float *restrict value,
+                          __global uint *restrict sign) {
     const uint first = get_global_id(0) * run, end = min(first + run, bricks);
     for (uint brick = first; brick < end; ++brick) {
-        __global const float *const v = value + (size_t)brick * OV_PACK;
+        __global const float *const v = value + (size_t)place[brick] * OV_PACK;
         uint mask = 0;
         for (uint j = 0; j < OV_PACK; ++j)
             mask |= (v[j] >= isovalue ? 1u : 0u) << j;
@@ -116,41 +119,42 @@ __kernel void march_count(const uint nx, const uint ny, const uint nz, const uin
     }
 }
 
-/* A list of bricks that something is done with: {number in the padded grid, place}. */
-
-/* values[place] = the brick's values. */
+/* values[k] = those of the k-th brick of the list. */
 __kernel void march_get(const uint count, __global const uint *restrict list,
-                        __global const float *restrict value, __global float *restrict values) {
+                        __global const uint *restrict place, __global const float *restrict value,
+                        __global float *restrict values) {
     const uint k = get_global_id(0);
     if (k >= count)
         return;
+    __global const float *const from = value + (size_t)place[list[k]] * OV_PACK;
     for (uint j = 0; j < OV_PACK; ++j)
-        values[(size_t)k * OV_PACK + j] = value[(size_t)list[k] * OV_PACK + j];
+        values[(size_t)k * OV_PACK + j] = from[j];
 }
 
-/* The brick's values = values[place], and its crossings. */
+/* The other way, with the bricks' crossings. */
 __kernel void march_put(const uint count, __global const uint *restrict list,
-                        __global const float *restrict values,
+                        __global const uint *restrict place, __global const float *restrict values,
                         __global const uint4 *restrict crossings, __global float *restrict value,
                         __global uint4 *restrict crossing) {
     const uint k = get_global_id(0);
     if (k >= count)
         return;
+    __global float *const to = value + (size_t)place[list[k]] * OV_PACK;
     for (uint j = 0; j < OV_PACK; ++j)
-        value[(size_t)list[k] * OV_PACK + j] = values[(size_t)k * OV_PACK + j];
+        to[j] = values[(size_t)k * OV_PACK + j];
     crossing[list[k]] = crossings[k];
 }
 
 /* Number of a point within its brick, and of its brick within the padded grid. */
-typedef struct place {
+typedef struct spot {
     uint brick, point;
-} place;
+} spot;
 
 /* The point at `corner` of the cell of `point` in `brick`. */
-static inline place move_to_corner(uint brick, uint point, uint corner, uint nx, uint ny) {
+static inline spot move_to_corner(uint brick, uint point, uint corner, uint nx, uint ny) {
     uint x = (point & 3u) + (corner & 1u), y = (point >> 2 & 1u) + (corner >> 1 & 1u),
          z = (point >> 3) + (corner >> 2);
-    place p;
+    spot p;
     p.brick = brick + x / OV_BRICK_X + (nx + 1) * (y / OV_BRICK_Y + (ny + 1) * (z / OV_BRICK_Z));
     p.point = x % OV_BRICK_X + OV_BRICK_X * (y % OV_BRICK_Y + OV_BRICK_Y * (z % OV_BRICK_Z));
     return p;
@@ -173,6 +177,7 @@ static inline float crossing_at(float a, float b, float isovalue, int logarithmi
  * the piece's corner, axis << 20, and 1 << 22 if the low end is inside. t: where on the edge. */
 __kernel void march_vertices(const uint count, __global const uint4 *restrict list, const uint nx,
                              const uint ny, const float isovalue, const int logarithmic,
+                             __global const uint *restrict place,
                              __global const float *restrict value,
                              __global const uint4 *restrict crossing, __global uint *restrict edge,
                              __global float *restrict t) {
@@ -188,9 +193,9 @@ __kernel void march_vertices(const uint count, __global const uint4 *restrict li
     for (uint axis = 0; axis < 3; ++axis)
         for (uint points = mask[axis]; points; points &= points - 1, ++at) {
             const uint point = lowest_bit(points);
-            const place end = move_to_corner(brick, point, 1u << axis, nx, ny);
-            const float a = value[(size_t)brick * OV_PACK + point];
-            const float b = value[(size_t)end.brick * OV_PACK + end.point];
+            const spot end = move_to_corner(brick, point, 1u << axis, nx, ny);
+            const float a = value[(size_t)place[brick] * OV_PACK + point];
+            const float b = value[(size_t)place[end.brick] * OV_PACK + end.point];
             const uint x = bx * OV_BRICK_X + (point & 3u), y = by * OV_BRICK_Y + (point >> 2 & 1u),
                        z = bz * OV_BRICK_Z + (point >> 3);
             edge[at] = x | y << 7 | z << 14 | axis << 20 | (a >= isovalue ? 1u : 0u) << 22;
@@ -216,7 +221,7 @@ __kernel void march_triangles(const uint count, __global const uint4 *restrict l
         const uint edges = 3u * entry[0];
         for (uint k = 1; k <= edges; ++k, ++at) {
             const uint axis = entry[k] >> 3;
-            const place low = move_to_corner(brick, point, entry[k] & 7u, nx, ny);
+            const spot low = move_to_corner(brick, point, entry[k] & 7u, nx, ny);
             const uint4 crossed = crossing[low.brick];
             const uint before = (1u << low.point) - 1;
             const uint own = axis == 0 ? crossed.y : axis == 1 ? crossed.z : crossed.w;
@@ -235,6 +240,10 @@ __kernel void march_triangles(const uint count, __global const uint4 *restrict l
 #define TO_FLOAT(x) OV_JOIN(convert_float, OV_VECTOR)(x)
 #define ANY(x) any(x)
 #endif
+
+/* A bracket must be this much smaller than the last of Newton's steps: it halves its error, where
+ * they square it. */
+#define HALVED 64.0f
 
 /* Moves the vertices along their edges to where phi = c, by Newton's steps on ln phi, and by
  * halving the bracket where such a step would leave it. A step under `close` (in lattice steps) is
@@ -292,10 +301,11 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
             from = moving && beyond ? s : from;
             to = moving && !beyond ? s : to;
             const ov_vec slope = fma(gx, ux, fma(gy, uy, gz * uz)) * (M_LN2_F * h);
-            const ov_vec newton = s + log(max(sum, 1e-37f) / isovalue) * sum / slope;
+            const ov_vec newton =
+                sum == isovalue ? s : s + log(max(sum, 1e-37f) / isovalue) * sum / slope;
             const ov_ivec within = newton >= from - close && newton <= to + close;
             const ov_vec next = within ? clamp(newton, from, to) : 0.5f * (from + to);
-            const ov_vec left = within ? fabs(next - s) : to - from;
+            const ov_vec left = within ? fabs(next - s) : (to - from) * HALVED;
             s = moving ? next : s;
             moving = moving && left >= close;
             if (!ANY(moving))

@@ -1,6 +1,5 @@
 #include "field/bricks.h"
 
-#include <float.h>
 #include <stdlib.h>
 
 _Static_assert(OV_BRICK_X *OV_BRICK_Y *OV_BRICK_Z == OV_PACK, "a brick is a pack");
@@ -23,16 +22,26 @@ static void lay_brick(const uint64_t at[3], const double step[3], float *packed,
     }
 }
 
-static void lay_nothing(float *box) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-        box[axis] = FLT_MAX;
-        box[axis + 3] = -FLT_MAX;
-    }
+ovoid_status ov_bricks_order(ovoid_context *context, const uint64_t bricks[3], uint32_t *order) {
+    const size_t count = (size_t)(bricks[0] * bricks[1] * bricks[2]);
+    uint64_t *const keys = ov_alloc(context, count, sizeof *keys, "lattice bricks");
+    if (!keys)
+        return OVOID_ERROR_MEMORY;
+    unsigned bits = 1;
+    while (bricks[0] >> bits || bricks[1] >> bits || bricks[2] >> bits)
+        ++bits;
+    size_t k = 0;
+    for (uint32_t z = 0; z < bricks[2]; ++z)
+        for (uint32_t y = 0; y < bricks[1]; ++y)
+            for (uint32_t x = 0; x < bricks[0]; ++x)
+                keys[k++] = ov_hilbert_index(x, y, z, bits);
+    const ovoid_status status = ov_sort_keys(context, keys, count, order);
+    free(keys);
+    return status;
 }
 
 ovoid_status ov_bricks_upload(ovoid_context *context, const uint64_t bricks[3],
-                              const uint64_t evaluated[3], const double step[3],
-                              ov_points *points) {
+                              const uint32_t *order, const double step[3], ov_points *points) {
     ovoid_status status = OVOID_OK;
     const size_t packs = (size_t)(bricks[0] * bricks[1] * bricks[2]);
     float *const packed = ov_alloc(context, packs * 3 * OV_PACK, sizeof *packed, "lattice points");
@@ -41,16 +50,11 @@ ovoid_status ov_bricks_upload(ovoid_context *context, const uint64_t bricks[3],
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    size_t pack = 0;
-    for (uint64_t z = 0; z < bricks[2]; ++z)
-        for (uint64_t y = 0; y < bricks[1]; ++y)
-            for (uint64_t x = 0; x < bricks[0]; ++x, ++pack) {
-                if (x < evaluated[0] && y < evaluated[1] && z < evaluated[2])
-                    lay_brick((const uint64_t[3]){x, y, z}, step, packed + pack * (3 * OV_PACK),
-                              boxes + pack * 6);
-                else
-                    lay_nothing(boxes + pack * 6);
-            }
+    for (size_t k = 0; k < packs; ++k) {
+        const uint64_t at[3] = {order[k] % bricks[0], order[k] / bricks[0] % bricks[1],
+                                order[k] / (bricks[0] * bricks[1])};
+        lay_brick(at, step, packed + k * (3 * OV_PACK), boxes + k * 6);
+    }
     points->count = packs * OV_PACK;
     points->packs = packs;
     OV_TRY(ov_points_upload(context, packed, boxes, points));

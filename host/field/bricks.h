@@ -13,11 +13,13 @@ static inline void ov_brick_point(uint64_t j, uint64_t within[3]) {
     within[2] = j / (OV_BRICK_X * OV_BRICK_Y);
 }
 
-/* Uploads bricks of points `step` angstrom apart in raster order (x fastest), relative to the first
- * point. The grid is bricks[0] x bricks[1] x bricks[2], of which the first evaluated[0] x ... have
- * points; the rest take their places among the packs, but no term reaches them. Frees with
- * ov_points_destroy(). */
+/* order[k] = the k-th brick along a space-filling curve, of bricks[0] x bricks[1] x bricks[2]
+ * numbered in raster order (x fastest). */
+ovoid_status ov_bricks_order(ovoid_context *context, const uint64_t bricks[3], uint32_t *order);
+
+/* Uploads the bricks as packs in this order, with points `step` angstrom apart and relative to the
+ * first one. Frees with ov_points_destroy(). */
 ovoid_status ov_bricks_upload(ovoid_context *context, const uint64_t bricks[3],
-                              const uint64_t evaluated[3], const double step[3], ov_points *points);
+                              const uint32_t *order, const double step[3], ov_points *points);
 
 #endif

@@ -36,6 +36,7 @@ typedef struct sampler {
     ov_operations operations;
     ov_buffer value;
     float *values;        /* of one piece */
+    uint32_t *order;      /* its packs as bricks */
     ov_quadric *quadrics; /* of one piece's atoms */
     size_t quadrics_capacity;
     float *kept;                      /* x, y, z relative to origin */
@@ -143,17 +144,21 @@ fail:
     return OVOID_ERROR_MEMORY;
 }
 
-/* The bricks of a piece, in raster order; the same for all pieces since each has its own origin. */
+/* The bricks of a piece, along a curve, as the tree over them wants it; the same for all pieces
+ * since each has its own origin. */
 static ovoid_status lay_piece(ovoid_context *context, sampler *s) {
     uint64_t bricks[3];
     for (size_t axis = 0; axis < 3; ++axis)
         bricks[axis] = s->pieces.size[axis] / brick[axis];
-    const ovoid_status status =
-        ov_bricks_upload(context, bricks, bricks, s->lattice->step, &s->points);
+    const size_t packs = (size_t)(bricks[0] * bricks[1] * bricks[2]);
+    s->order = ov_alloc(context, packs, sizeof *s->order, "lattice bricks");
+    s->values = ov_alloc(context, packs * OV_PACK, sizeof *s->values, "lattice values");
+    if (!s->order || !s->values)
+        return OVOID_ERROR_MEMORY;
+    const ovoid_status status = ov_bricks_order(context, bricks, s->order);
     if (status != OVOID_OK)
         return status;
-    s->values = ov_alloc(context, s->points.count, sizeof *s->values, "lattice values");
-    return s->values ? OVOID_OK : OVOID_ERROR_MEMORY;
+    return ov_bricks_upload(context, bricks, s->order, s->lattice->step, &s->points);
 }
 
 /* phi at the points of one piece, into s->values. */
@@ -229,7 +234,7 @@ static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t
     for (size_t k = 0; k < s->points.count; ++k) {
         if (!(s->values[k] >= s->band.low && s->values[k] <= s->band.high))
             continue;
-        const uint64_t pack = k / OV_PACK;
+        const uint64_t pack = s->order[k / OV_PACK];
         uint64_t within[3];
         ov_brick_point(k % OV_PACK, within);
         const uint64_t index[3] = {
@@ -300,6 +305,7 @@ static void destroy_sampler(sampler *s) {
     free(s->pieces.start);
     free(s->pieces.atom);
     free(s->values);
+    free(s->order);
     free(s->quadrics);
     free(s->kept);
     ov_points_destroy(&s->points);

@@ -10,7 +10,7 @@
 
 /* Newton's steps of a vertex at most: a few, or enough to halve a bracket down to rounding. */
 #define REFINE_STEPS 24
-#define REFINE_CLOSE 2e-4 /* lattice steps; what is left after such a step is of order 1e-8 */
+#define REFINE_CLOSE 1e-4 /* lattice steps; what is left after such a step is of order 1e-8 */
 
 #define BOX 6        /* low x, y, z, high x, y, z */
 #define CROSSING 4   /* values per brick: number of the first vertex, masks along x, y, z */
@@ -25,6 +25,7 @@ typedef struct brick_grid {
     size_t face_start[4];
     cl_uint *ghost; /* those beyond the last ones: along x, y, z, xy, xz, yz, xyz */
     size_t ghosts;
+    cl_uint *place; /* pack with the values of a brick of the padded grid */
 } brick_grid;
 
 /* What a piece leaves behind for those before it: its faces. */
@@ -49,7 +50,7 @@ typedef struct marcher {
     ov_operations operations;
     ov_kernel signs, count, get, put, fill_vertices, fill_triangles, refine;
     ov_buffer value, sign, crossing, triangle_count, cases, list, edge, t, normal, corners;
-    ov_buffer face_list, ghost_list, values, crossings;
+    ov_buffer face_list, ghost_list, place, values, crossings;
     size_t group;
     cl_uint run;
 
@@ -59,7 +60,8 @@ typedef struct marcher {
     cl_uint *host_count;    /* triangles of each brick */
     float *ghost_value;
     cl_uint *ghost_crossing;
-    cl_uint *active; /* entries of march_vertices()'s list */
+    bool ghosts_empty; /* on the device */
+    cl_uint *active;   /* entries of march_vertices()'s list */
     size_t active_count;
     cl_uint *edges; /* of the piece's vertices, in packs */
     size_t edges_capacity;
@@ -117,22 +119,16 @@ static void list_ghosts(brick_grid *grid) {
     *next = padded_number(grid, n[0], n[1], n[2]);
 }
 
-static ovoid_status order_bricks(ovoid_context *context, brick_grid *grid) {
-    const uint64_t *const n = grid->bricks;
-    uint64_t *const keys = ov_alloc(context, grid->total, sizeof *keys, "lattice bricks");
-    if (!keys)
-        return OVOID_ERROR_MEMORY;
-    unsigned bits = 1;
-    while (n[0] >> bits || n[1] >> bits || n[2] >> bits)
-        ++bits;
-    size_t k = 0;
-    for (uint32_t z = 0; z < n[2]; ++z)
-        for (uint32_t y = 0; y < n[1]; ++y)
-            for (uint32_t x = 0; x < n[0]; ++x)
-                keys[k++] = ov_hilbert_index(x, y, z, bits);
-    const ovoid_status status = ov_sort_keys(context, keys, grid->total, grid->curve);
-    free(keys);
-    return status;
+/* Evaluated bricks come first among the packs, along the curve; then the others. */
+static void place_bricks(brick_grid *grid) {
+    const uint64_t nx = grid->bricks[0], ny = grid->bricks[1];
+    for (size_t k = 0; k < grid->total; ++k) {
+        const uint32_t brick = grid->curve[k];
+        grid->place[padded_number(grid, brick % nx, brick / nx % ny, brick / (nx * ny))] =
+            (cl_uint)k;
+    }
+    for (size_t k = 0; k < grid->ghosts; ++k)
+        grid->place[grid->ghost[k]] = (cl_uint)(grid->total + k);
 }
 
 static ovoid_status make_grid(ovoid_context *context, const ov_pieces *pieces, brick_grid *grid) {
@@ -151,11 +147,16 @@ static ovoid_status make_grid(ovoid_context *context, const ov_pieces *pieces, b
     grid->curve = ov_alloc(context, grid->total, sizeof *grid->curve, "lattice bricks");
     grid->face = ov_alloc(context, grid->face_start[3], sizeof *grid->face, "lattice bricks");
     grid->ghost = ov_alloc(context, grid->ghosts, sizeof *grid->ghost, "lattice bricks");
-    if (!grid->curve || !grid->face || !grid->ghost)
+    grid->place = ov_alloc(context, grid->padded_total, sizeof *grid->place, "lattice bricks");
+    if (!grid->curve || !grid->face || !grid->ghost || !grid->place)
         return OVOID_ERROR_MEMORY;
+    const ovoid_status status = ov_bricks_order(context, n, grid->curve);
+    if (status != OVOID_OK)
+        return status;
     list_faces(grid);
     list_ghosts(grid);
-    return order_bricks(context, grid);
+    place_bricks(grid);
+    return OVOID_OK;
 }
 
 /* ---- setting up --------------------------------------------------------------------------- */
@@ -192,6 +193,9 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     OV_TRY(upload(context, &m->face_list, grid->face, faces * sizeof(cl_uint), "lattice bricks"));
     OV_TRY(upload(context, &m->ghost_list, grid->ghost, grid->ghosts * sizeof(cl_uint),
                   "lattice bricks"));
+    OV_TRY(upload(context, &m->place, grid->place, padded * sizeof(cl_uint), "lattice bricks"));
+    OV_TRY(
+        ov_buffer_reserve(context, &m->value, padded * OV_PACK * sizeof(float), "lattice values"));
     OV_TRY(ov_buffer_reserve(context, &m->sign, padded * sizeof(cl_uint), "signs of bricks"));
     OV_TRY(ov_buffer_reserve(context, &m->crossing, padded * CROSSING * sizeof(cl_uint),
                              "crossings of bricks"));
@@ -224,7 +228,7 @@ static ovoid_status set_up(ovoid_context *context, marcher *m) {
     m->run = device->shape.lanes == 1 ? BRICK_RUN : 1;
     OV_TRY(make_kernels(context, m));
     OV_TRY(make_grid(context, &m->pieces, &m->grid));
-    OV_TRY(ov_bricks_upload(context, m->grid.padded, m->grid.bricks, step, &m->points));
+    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
     OV_TRY(reserve_piece(context, m));
 cleanup:
     return status;
@@ -281,15 +285,16 @@ static ovoid_status fill_ghosts(ovoid_context *context, marcher *m) {
     k = copy_ghosts(m, k, neighbour(m, 1, 0, 1), start[0], 1, ny, &any);
     k = copy_ghosts(m, k, neighbour(m, 0, 1, 1), start[1], 1, nx, &any);
     copy_ghosts(m, k, neighbour(m, 1, 1, 1), start[0], 1, 1, &any);
-    if (!any)
+    if (!any && m->ghosts_empty)
         return OVOID_OK;
+    m->ghosts_empty = !any;
     OV_TRY(ov_buffer_write(context, &m->values, 0, m->ghost_value,
                            grid->ghosts * OV_PACK * sizeof *m->ghost_value));
     OV_TRY(ov_buffer_write(context, &m->crossings, 0, m->ghost_crossing,
                            grid->ghosts * CROSSING * sizeof *m->ghost_crossing));
     OV_TRY(OV_LAUNCH(context, &m->put, grid->ghosts, m->group, OV_ARG(count),
-                     OV_ARG(m->ghost_list.memory), OV_ARG(m->values.memory),
-                     OV_ARG(m->crossings.memory), OV_ARG(m->value.memory),
+                     OV_ARG(m->ghost_list.memory), OV_ARG(m->place.memory),
+                     OV_ARG(m->values.memory), OV_ARG(m->crossings.memory), OV_ARG(m->value.memory),
                      OV_ARG(m->crossing.memory)));
 cleanup:
     return status;
@@ -317,7 +322,7 @@ static ovoid_status keep_faces(ovoid_context *context, marcher *m, size_t piece)
     if (!kept->value || !kept->crossing)
         return OVOID_ERROR_MEMORY;
     OV_TRY(OV_LAUNCH(context, &m->get, faces, m->group, OV_ARG(count), OV_ARG(m->face_list.memory),
-                     OV_ARG(m->value.memory), OV_ARG(m->values.memory)));
+                     OV_ARG(m->place.memory), OV_ARG(m->value.memory), OV_ARG(m->values.memory)));
     OV_TRY(
         ov_buffer_read(context, &m->values, 0, kept->value, faces * OV_PACK * sizeof *kept->value));
     for (size_t k = 0; k < faces; ++k)
@@ -411,8 +416,8 @@ static ovoid_status classify(ovoid_context *context, marcher *m) {
                   ny = (cl_uint)grid->bricks[1], nz = (cl_uint)grid->bricks[2];
     const cl_float isovalue = (cl_float)m->options->isovalue;
     OV_TRY(OV_LAUNCH(context, &m->signs, (padded + m->run - 1) / m->run, m->group, OV_ARG(padded),
-                     OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->value.memory),
-                     OV_ARG(m->sign.memory)));
+                     OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->place.memory),
+                     OV_ARG(m->value.memory), OV_ARG(m->sign.memory)));
     OV_TRY(OV_LAUNCH(context, &m->count, (grid->total + m->run - 1) / m->run, m->group, OV_ARG(nx),
                      OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->sign.memory),
                      OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
@@ -464,8 +469,8 @@ static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t pac
     OV_TRY(ov_buffer_reserve(context, &m->t, room * sizeof(cl_float), "vertices"));
     OV_TRY(OV_LAUNCH(context, &m->fill_vertices, m->active_count, m->group, OV_ARG(active),
                      OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(isovalue),
-                     OV_ARG(logarithmic), OV_ARG(m->value.memory), OV_ARG(m->crossing.memory),
-                     OV_ARG(m->edge.memory), OV_ARG(m->t.memory)));
+                     OV_ARG(logarithmic), OV_ARG(m->place.memory), OV_ARG(m->value.memory),
+                     OV_ARG(m->crossing.memory), OV_ARG(m->edge.memory), OV_ARG(m->t.memory)));
     OV_TRY(ov_grow(context, &m->edges, &m->edges_capacity, room, sizeof *m->edges, "vertices"));
     OV_TRY(ov_buffer_read(context, &m->edge, 0, m->edges, count * sizeof *m->edges));
     OV_TRY(ov_buffer_read(context, &m->t, (count - 1) * sizeof *last, last, sizeof *last));
@@ -684,16 +689,16 @@ static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
 /* ---- all of it ---------------------------------------------------------------------------- */
 
 static void destroy_marcher(marcher *m) {
-    ov_buffer *const buffers[] = {&m->value,  &m->sign,     &m->crossing,  &m->triangle_count,
-                                  &m->cases,  &m->list,     &m->edge,      &m->t,
-                                  &m->normal, &m->corners,  &m->face_list, &m->ghost_list,
-                                  &m->values, &m->crossings};
+    ov_buffer *const buffers[] = {&m->value,  &m->sign,    &m->crossing,  &m->triangle_count,
+                                  &m->cases,  &m->list,    &m->edge,      &m->t,
+                                  &m->normal, &m->corners, &m->face_list, &m->ghost_list,
+                                  &m->place,  &m->values,  &m->crossings};
     ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
                                   &m->fill_vertices, &m->fill_triangles, &m->refine};
-    void *const memory[] = {m->grid.curve,    m->grid.face,  m->grid.ghost,  m->quadrics,
-                            m->host_crossing, m->host_count, m->ghost_value, m->ghost_crossing,
-                            m->active,        m->edges,      m->boxes,       m->refined,
-                            m->xyz,           m->normals,    m->triangle};
+    void *const memory[] = {m->grid.curve,     m->grid.face,     m->grid.ghost, m->grid.place,
+                            m->quadrics,       m->host_crossing, m->host_count, m->ghost_value,
+                            m->ghost_crossing, m->active,        m->edges,      m->boxes,
+                            m->refined,        m->xyz,           m->normals,    m->triangle};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)

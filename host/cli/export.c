@@ -238,13 +238,14 @@ static ovoid_export_format format_of(const export_job *job) {
 static void print_summary(const export_job *job) {
     if (job->quiet || strcmp(job->output, "-") == 0)
         return;
+    const char *from = strcmp(job->input, "-") == 0 ? "standard input" : job->input;
     const char *name = ovoid_export_format_name(format_of(job));
     if (job->model)
-        printf("%s: %zu ellipsoids, written to %s as %s\n", job->input,
-               ovoid_model_size(job->model), job->output, name);
+        printf("%s: %zu ellipsoids, written to %s as %s\n", from, ovoid_model_size(job->model),
+               job->output, name);
     else
-        printf("%s: %zu atoms, written to %s as %s\n", job->input,
-               ovoid_molecule_atoms(job->molecule), job->output, name);
+        printf("%s: %zu atoms, written to %s as %s\n", from, ovoid_molecule_atoms(job->molecule),
+               job->output, name);
 }
 
 static int run(export_job *job) {

@@ -36,8 +36,13 @@ const char *ovoid_export_format_name(ovoid_export_format which) {
 }
 
 ovoid_export_format ovoid_export_format_find(const char *name) {
-    for (int i = 1; name && i < FORMATS; i++)
-        if (strcasecmp(name, formats[i].name) == 0 || ov_extension_is(name, formats[i].extensions))
+    char dotted[16];
+    if (!name || (size_t)snprintf(dotted, sizeof dotted, ".%s", name) >= sizeof dotted)
+        return OVOID_EXPORT_AUTO;
+    for (int i = 1; i < FORMATS; i++)
+        if (strcasecmp(name, formats[i].name) == 0 ||
+            ov_extension_is(name, formats[i].extensions) ||
+            ov_extension_is(dotted, formats[i].extensions))
             return (ovoid_export_format)i;
     return OVOID_EXPORT_AUTO;
 }

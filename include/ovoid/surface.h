@@ -193,8 +193,8 @@ OVOID_API ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid
 /* Name of a format as ovoid_export_format_find() takes it, "bild" for example; NULL for others. */
 OVOID_API const char *ovoid_export_format_name(ovoid_export_format format);
 
-/* The format of a name or of an extension with its dot, in any case of letters; AUTO when there is
- * none. */
+/* The format of a name ("ccp4") or an extension ("mrc", with its dot or without), in any case of
+ * letters; AUTO when there is none. */
 OVOID_API ovoid_export_format ovoid_export_format_find(const char *name);
 
 /* ---- pictures ----------------------------------------------------------------------------- */

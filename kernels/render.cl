@@ -74,8 +74,8 @@ static inline void ov_march(const ov_box_terms list, ov_vec x, ov_vec y, float z
     for (uint k = list.first; k < list.end; ++k) {
         const ov_term t = list.terms[list.item[k]];
         const ov_vec dx = x - t.x, dy = y - t.y;
-        const ov_vec flat = t.log2_amplitude -
-                            fma(dx, fma(dy, (ov_vec)(t.xy), dx * t.xx), dy * (dy * t.yy));
+        const ov_vec flat =
+            t.log2_amplitude - fma(dx, fma(dy, (ov_vec)(t.xy), dx * t.xx), dy * (dy * t.yy));
         const ov_vec tilt = fma(dx, (ov_vec)(t.xz), dy * t.yz);
 #pragma unroll
         for (uint s = 0; s < OV_STEPS; ++s) {
@@ -134,8 +134,8 @@ static inline void ov_catch(ov_bracket *bracket, ov_ivec where, ov_vec outer, ov
 /* Newton's method, halving the bracket where it would leave it. */
 static inline ov_vec ov_refine(const ov_box_terms list, ov_vec x, ov_vec y, float level,
                                ov_bracket b) {
-    ov_vec z = b.outer + (b.inner - b.outer) * ((level - b.outer_value) /
-                                                max(b.inner_value - b.outer_value, 1e-30f));
+    ov_vec z = b.outer + (b.inner - b.outer) *
+                             ((level - b.outer_value) / max(b.inner_value - b.outer_value, 1e-30f));
     for (uint k = 0; k < OV_REFINEMENTS; ++k) {
         ov_vec value, growth;
         ov_along(list, x, y, z, &value, &growth);
@@ -165,9 +165,11 @@ __kernel void trace(const uint packs, const uint blocks, const uint tile, const 
     if (pack >= packs)
         return;
     const uint column = pack % blocks * OV_BLOCK_X, row = pack / blocks * OV_BLOCK_Y;
-    __global const uint *const boxes = box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
+    __global const uint *const boxes =
+        box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
     for (uint v = 0; v < OV_VECTORS; ++v) {
-        const ov_vec x = left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
+        const ov_vec x =
+            left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
         const ov_vec y = top - ((float)row + OV_LOAD(v * OV_LANES + lane, ov_block_y)) * spacing;
         ov_vec z = OV_NOWHERE, nx = 0.0f, ny = 0.0f, nz = 0.0f;
         ov_vec before = 0.0f, before_growth = 0.0f;
@@ -227,22 +229,22 @@ __kernel void trace(const uint packs, const uint blocks, const uint tile, const 
 
 /* As trace(), for the terms as ellipsoids of their own: the surface q = reach of each. term: which
  * one is met. */
-__kernel void trace_ellipsoids(const uint packs, const uint blocks, const uint tile,
-                               const uint tiles, const uint slabs, const float left,
-                               const float top, const float spacing, const float front,
-                               const float step, __global const uint *restrict box_of,
-                               __global const uint *restrict start,
-                               __global const uint *restrict item,
-                               __global const ov_term *restrict terms,
-                               __global float *restrict depth, __global int *restrict normal,
-                               __global int *restrict term) {
+__kernel void
+trace_ellipsoids(const uint packs, const uint blocks, const uint tile, const uint tiles,
+                 const uint slabs, const float left, const float top, const float spacing,
+                 const float front, const float step, __global const uint *restrict box_of,
+                 __global const uint *restrict start, __global const uint *restrict item,
+                 __global const ov_term *restrict terms, __global float *restrict depth,
+                 __global int *restrict normal, __global int *restrict term) {
     const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
     if (pack >= packs)
         return;
     const uint column = pack % blocks * OV_BLOCK_X, row = pack / blocks * OV_BLOCK_Y;
-    __global const uint *const boxes = box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
+    __global const uint *const boxes =
+        box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
     for (uint v = 0; v < OV_VECTORS; ++v) {
-        const ov_vec x = left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
+        const ov_vec x =
+            left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
         const ov_vec y = top - ((float)row + OV_LOAD(v * OV_LANES + lane, ov_block_y)) * spacing;
         ov_vec z = OV_NOWHERE, nx = 0.0f, ny = 0.0f, nz = 0.0f;
         ov_ivec which = 0, open = -1;
@@ -258,8 +260,8 @@ __kernel void trace_ellipsoids(const uint packs, const uint blocks, const uint t
                 const ov_vec dz = (sqrt(max(under, 0.0f)) - tilt) / (2.0f * t.zz);
                 const ov_vec met = dz + t.z;
                 /* What lies below the slab waits for its own: another term may come before it. */
-                const ov_ivec nearer = open & OV_MASK(under >= 0.0f) & OV_MASK(met >= bottom) &
-                                       OV_MASK(met > z);
+                const ov_ivec nearer =
+                    open & OV_MASK(under >= 0.0f) & OV_MASK(met >= bottom) & OV_MASK(met > z);
                 z = select(z, met, nearer);
                 nx = select(nx, fma(dx, (ov_vec)(2.0f * t.xx), fma(dy, (ov_vec)(t.xy), dz * t.xz)),
                             nearer);
@@ -290,10 +292,12 @@ __kernel void compare(const uint packs, const uint blocks, const uint tile, cons
     if (pack >= packs)
         return;
     const uint column = pack % blocks * OV_BLOCK_X, row = pack / blocks * OV_BLOCK_Y;
-    __global const uint *const boxes = box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
+    __global const uint *const boxes =
+        box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
     const size_t base = (size_t)pack * OV_PACK;
     for (uint v = 0; v < OV_VECTORS; ++v) {
-        const ov_vec x = left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
+        const ov_vec x =
+            left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
         const ov_vec y = top - ((float)row + OV_LOAD(v * OV_LANES + lane, ov_block_y)) * spacing;
         const ov_vec z = OV_LOAD(v * OV_LANES + lane, depth + base);
         const ov_vec steep = OV_LOAD(v * OV_LANES + lane, slope + base);
@@ -320,8 +324,8 @@ __kernel void compare(const uint packs, const uint blocks, const uint tile, cons
     }
 }
 
-/* Glass over a surface: angstrom over which it begins where both cross, and over which what lies below
- * comes out of its tint: a thin film shows its colour, deep glass what is in it. */
+/* Glass over a surface: angstrom over which it begins where both cross, and over which what lies
+ * below comes out of its tint: a thin film shows its colour, deep glass what is in it. */
 #define OV_GLASS_EDGE 0.05f
 #define OV_GLASS_DEPTH 0.5f
 
@@ -349,8 +353,8 @@ static inline float4 ov_unpack_normal(int packed) {
 /* Share of the light from all around that is left at a point: neighbours on the screen that rise
  * above its tangent plane take some away. taps: offsets in units of reach (angstrom). */
 static inline float ov_openness(const ov_seen seen, int column, int row, float z, float4 n,
-                                float spacing, float reach, __global const float2 *taps,
-                                uint first, uint stride, uint count) {
+                                float spacing, float reach, __global const float2 *taps, uint first,
+                                uint stride, uint count) {
     float closed = 0.0f;
     for (uint k = first; k < count; k += stride) {
         const float2 tap = taps[k] * (reach / spacing);
@@ -392,7 +396,8 @@ static inline float4 ov_light(float4 colour, float4 n, float open, float4 key, f
     return colour * (diffuse * edge) + shine;
 }
 
-static inline float4 ov_fade(float4 colour, float4 haze, float z, float near, float far, float most) {
+static inline float4 ov_fade(float4 colour, float4 haze, float z, float near, float far,
+                             float most) {
     const float share = most * clamp((near - z) / max(near - far, 1e-6f), 0.0f, 1.0f);
     return mix(colour, haze, share);
 }
@@ -464,9 +469,11 @@ __kernel void shade(const uint width, const uint height, const uint samples, con
                     ov_openness(pane, x, y, front, n, spacing, reach, taps, k, rays, tap_count);
                 float4 veil = ov_fade(ov_light(glass_colour, n, open, key, fill, ambient), haze,
                                       front, near, far, most);
-                const float slant = 1.0f - n.z, depth_share = exp(-max(thick, 0.0f) / OV_GLASS_DEPTH);
-                const float opacity = smoothstep(-OV_GLASS_EDGE, OV_GLASS_EDGE, thick) *
-                                      mix(mix(0.5f, 0.88f, depth_share), 0.95f, slant * slant * slant);
+                const float slant = 1.0f - n.z,
+                            depth_share = exp(-max(thick, 0.0f) / OV_GLASS_DEPTH);
+                const float opacity =
+                    smoothstep(-OV_GLASS_EDGE, OV_GLASS_EDGE, thick) *
+                    mix(mix(0.5f, 0.88f, depth_share), 0.95f, slant * slant * slant);
                 veil.w = 1.0f;
                 light = mix(light, veil, opacity);
                 any_surface = true;
@@ -477,7 +484,8 @@ __kernel void shade(const uint width, const uint height, const uint samples, con
     }
     sum /= (float)rays;
     const float whole = max(sum.w, 1e-6f);
-    image[pixel] = (uchar4)(ov_encode(sum.x / whole), ov_encode(sum.y / whole),
-                            ov_encode(sum.z / whole), (uchar)(clamp(sum.w, 0.0f, 1.0f) * 255.0f + 0.5f));
+    image[pixel] =
+        (uchar4)(ov_encode(sum.x / whole), ov_encode(sum.y / whole), ov_encode(sum.z / whole),
+                 (uchar)(clamp(sum.w, 0.0f, 1.0f) * 255.0f + 0.5f));
     cover[pixel] = (uchar)met;
 }

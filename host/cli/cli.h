@@ -129,11 +129,15 @@ bool cli_is_model(const char *path);
 /* ---- subcommands ---------------------------------------------------------------------------- */
 
 int cli_fit(int argc, char **argv);
+int cli_mesh(int argc, char **argv);
+int cli_measure(int argc, char **argv);
 int cli_render(int argc, char **argv);
 int cli_devices(int argc, char **argv);
 int cli_export(int argc, char **argv);
 
 void cli_fit_help(FILE *stream);
+void cli_mesh_help(FILE *stream);
+void cli_measure_help(FILE *stream);
 void cli_render_help(FILE *stream);
 void cli_devices_help(FILE *stream);
 void cli_export_help(FILE *stream);

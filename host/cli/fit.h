@@ -4,7 +4,7 @@
 #ifndef CLI_FIT_H
 #define CLI_FIT_H
 
-#include "cli.h"
+#include "measures.h"
 
 /* Records every iteration in a CSV file. A trace that cannot be written ends without ending the
  * fit: the model is worth more. */
@@ -25,6 +25,8 @@ typedef struct fit_job {
     bool quiet;
     ovoid_molecule_format format;
     ovoid_fit_options options;
+    bool measure; /* compare the surfaces at the end */
+    ovoid_measure_options measuring;
 
     /* what came of it */
     FILE *summary; /* NULL: none */
@@ -32,9 +34,11 @@ typedef struct fit_job {
     ovoid_molecule *molecule;
     ovoid_model *model;
     ovoid_fit_result result;
+    bool measured;
+    ovoid_measures measures;
     fit_trace tracer;
     bool report_failed;
-    double started, device_seconds, read_seconds, write_seconds, total_seconds;
+    double started, device_seconds, read_seconds, measure_seconds, write_seconds, total_seconds;
 } fit_job;
 
 /* ---- fit_options.c -------------------------------------------------------------------------- */

@@ -18,6 +18,8 @@ typedef struct subcommand {
 
 static const subcommand subcommands[] = {
     {"fit", "fit a sparse model to a molecule's surface", cli_fit, cli_fit_help},
+    {"mesh", "write a surface as a triangle mesh", cli_mesh, cli_mesh_help},
+    {"measure", "compare a model's surface with its molecule's", cli_measure, cli_measure_help},
     {"export", "write a model or a field for another program", cli_export, cli_export_help},
     {"render", "take a picture of a molecule's and a model's surface", cli_render, cli_render_help},
     {"devices", "list the OpenCL devices", cli_devices, cli_devices_help},

@@ -61,9 +61,13 @@ void fit_summary_after(const fit_job *job) {
             (double)result->ellipsoids / (double)atoms);
     fprintf(out, "error     rms %.3g, largest %.3g (of the field, over the points)\n",
             result->rms_error, result->max_error);
-    fprintf(out, "time      %.2f s: device %.2f, read %.2f, sample %.2f, fit %.2f, write %.2f\n",
+    if (job->measured)
+        measures_print(out, &job->measures, &job->measuring);
+    fprintf(out,
+            "time      %.2f s: device %.2f, read %.2f, sample %.2f, fit %.2f, measure %.2f, write "
+            "%.2f\n",
             job->total_seconds, job->device_seconds, job->read_seconds, result->sample_seconds,
-            result->fit_seconds, job->write_seconds);
+            result->fit_seconds, job->measure_seconds, job->write_seconds);
     print_written(out, "model", job->output);
     if (job->report && !job->report_failed)
         print_written(out, "report", job->report);

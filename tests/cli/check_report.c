@@ -71,10 +71,23 @@ static const char *const numbers[] = {"atoms",
                                       "options.shrink",
                                       "options.grow",
                                       "options.max_backtracks",
+                                      "area.original",
+                                      "area.sparse",
+                                      "area.error",
+                                      "volume.original",
+                                      "volume.sparse",
+                                      "volume.error",
+                                      "hausdorff",
+                                      "mean_distance",
+                                      "hausdorff_outer",
+                                      "components.original",
+                                      "components.sparse",
+                                      "mesh_spacing",
                                       "seconds.device",
                                       "seconds.read",
                                       "seconds.sample",
                                       "seconds.fit",
+                                      "seconds.measure",
                                       "seconds.write",
                                       "seconds.total",
                                       "profile.lists_seconds",
@@ -106,7 +119,7 @@ static void check_keys(const cJSON *report) {
     double total = number(report, "seconds.total");
     double parts = number(report, "seconds.device") + number(report, "seconds.read") +
                    number(report, "seconds.sample") + number(report, "seconds.fit") +
-                   number(report, "seconds.write");
+                   number(report, "seconds.measure") + number(report, "seconds.write");
     expect(parts <= total + 1e-5, "the sum of seconds", parts, total);
     expect(number(report, "profile.field_passes") >= number(report, "iterations"), "field_passes",
            number(report, "profile.field_passes"), number(report, "iterations"));

@@ -56,8 +56,8 @@ static void print_settings(const fit_job *job, char *text, size_t size) {
         used += (size_t)snprintf(text + used, size - used, ", %s %.9g", fit_l1_numbers[i].name,
                                  cli_number_value(&fit_l1_numbers[i], options));
     if (used < size)
-        snprintf(text + used, size - used, ", first-step %s",
-                 fit_first_step_name(options->l1.first_step));
+        snprintf(text + used, size - used, ", kernel %s, first-step %s",
+                 fit_kernel_name(options->l1.kernel), fit_first_step_name(options->l1.first_step));
 }
 
 /* The model file says where it comes from. */

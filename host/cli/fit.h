@@ -47,6 +47,7 @@ typedef struct fit_job {
 bool fit_options_parse(int argc, char **argv, fit_job *job, int *code);
 
 const char *fit_method_name(ovoid_method method);
+const char *fit_kernel_name(ovoid_kernel kernel);
 const char *fit_first_step_name(ovoid_first_step first_step);
 
 /* The numbers of ovoid_fit_options that options set, apart for the surface and for method l1. */

@@ -68,6 +68,7 @@ enum {
     TRACE,
     QUIET,
     FORMAT,
+    KERNEL,
     FIRST_STEP,
     NO_MEASURE,
     MESH_SPACING,
@@ -83,6 +84,7 @@ static const struct option named[] = {
     {"trace", required_argument, NULL, TRACE},
     {"quiet", no_argument, NULL, QUIET},
     {"format", required_argument, NULL, FORMAT},
+    {"kernel", required_argument, NULL, KERNEL},
     {"first-step", required_argument, NULL, FIRST_STEP},
     {"no-measure", no_argument, NULL, NO_MEASURE},
     {"mesh-spacing", required_argument, NULL, MESH_SPACING},
@@ -100,6 +102,16 @@ const char *fit_method_name(ovoid_method method) {
     switch (method) {
     case OVOID_METHOD_L1:
         return "l1";
+    }
+    return "unknown";
+}
+
+const char *fit_kernel_name(ovoid_kernel kernel) {
+    switch (kernel) {
+    case OVOID_KERNEL_ELLIPSOID:
+        return "ellipsoid";
+    case OVOID_KERNEL_SPHERE:
+        return "sphere";
     }
     return "unknown";
 }
@@ -153,6 +165,13 @@ void cli_fit_help(FILE *stream) {
     fputs("\nThe measures of the surface at the end:\n", stream);
     cli_number_help(&mesh_spacing, &measuring, stream);
     fputs("  --no-measure        leave them out\n\nMethod l1:\n", stream);
+    fprintf(
+        stream,
+        "  --kernel NAME       what an atom's Gaussian may become: ellipsoid (everything about\n"
+        "                      it moves), or sphere (stays where it is and as wide, only its\n"
+        "                      amplitude moves: the sparse RBF model in Table 1 of the paper)\n"
+        "                      (default %s)\n",
+        fit_kernel_name(defaults.l1.kernel));
     for (size_t i = 0; i < fit_l1_count; i++)
         cli_number_help(&fit_l1_numbers[i], &defaults, stream);
     fprintf(
@@ -182,6 +201,18 @@ static bool parse_method(const char *text, ovoid_method *method) {
         return false;
     }
     *method = OVOID_METHOD_L1;
+    return true;
+}
+
+static bool parse_kernel(const char *text, ovoid_kernel *kernel) {
+    if (strcmp(text, fit_kernel_name(OVOID_KERNEL_ELLIPSOID)) == 0) {
+        *kernel = OVOID_KERNEL_ELLIPSOID;
+    } else if (strcmp(text, fit_kernel_name(OVOID_KERNEL_SPHERE)) == 0) {
+        *kernel = OVOID_KERNEL_SPHERE;
+    } else {
+        cli_error("--kernel takes ellipsoid or sphere, not '%s'", text);
+        return false;
+    }
     return true;
 }
 
@@ -298,6 +329,9 @@ bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
             break;
         case FORMAT:
             good = source_parse_molecule(optarg, &job->format);
+            break;
+        case KERNEL:
+            good = parse_kernel(optarg, &job->options.l1.kernel);
             break;
         case FIRST_STEP:
             good = parse_first_step(optarg, &job->options.l1.first_step);

@@ -224,7 +224,10 @@ static void open_standard_streams(void) {
 }
 
 int main(int argc, char **argv) {
+    static char buffer[1 << 16]; /* for any help, so that the flush below knows why it failed */
     open_standard_streams();
+    if (!isatty(STDOUT_FILENO))
+        setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     cli_catch_signals();
     int code = run(argc, argv);
     errno = 0;

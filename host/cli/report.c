@@ -107,6 +107,7 @@ ovoid_status fit_report_write(const fit_job *job) {
     add_numbers(&b, fit_surface_numbers, fit_surface_count, &job->options);
     builder options = add_object(&b, "options");
     add_numbers(&options, fit_l1_numbers, fit_l1_count, &job->options);
+    add_string(&options, "kernel", fit_kernel_name(job->options.l1.kernel));
     add_string(&options, "first_step", fit_first_step_name(job->options.l1.first_step));
     b.good = options.good;
     add_result(&b, job);

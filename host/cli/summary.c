@@ -54,8 +54,9 @@ void fit_summary_after(const fit_job *job) {
     fprintf(out, "points    %llu, spacing %.9g Å, padding %.9g Å\n", (count)result->points,
             options->spacing, options->padding);
     const count atoms = ovoid_molecule_atoms(job->molecule);
-    fprintf(out, "fit       %llu iteration%s of method %s\n", (count)result->iterations,
-            plural(result->iterations), fit_method_name(options->method));
+    fprintf(out, "fit       %llu iteration%s of method %s%s\n", (count)result->iterations,
+            plural(result->iterations), fit_method_name(options->method),
+            options->l1.kernel == OVOID_KERNEL_SPHERE ? ", spheres at the atoms" : "");
     fprintf(out, "model     %llu ellipsoid%s for %llu atom%s: sparse ratio %.3g\n",
             (count)result->ellipsoids, plural(result->ellipsoids), atoms, plural(atoms),
             (double)result->ellipsoids / (double)atoms);

@@ -100,8 +100,8 @@ static const char *const numbers[] = {"atoms",
                                       "profile.launches",
                                       "opencl.compute_units"};
 static const char *const texts[] = {
-    "version", "input",           "output",        "options.first_step", "method",
-    "device",  "opencl.platform", "opencl.vendor", "opencl.driver",      "opencl.version"};
+    "version", "input",           "output",        "options.kernel", "options.first_step", "method",
+    "device",  "opencl.platform", "opencl.vendor", "opencl.driver",  "opencl.version"};
 
 static void check_keys(const cJSON *report) {
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)

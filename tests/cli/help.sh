@@ -17,7 +17,7 @@ for command in "fit --help" "fit -h" "help fit" "fit molecule.pqr --decay 1 --he
     done
     for option in output report trace format device method quiet help decay isovalue spacing padding \
         iterations sparse-iterations epsilon max-error prune-below prune-every armijo shrink grow \
-        max-backtracks mesh-spacing no-measure; do
+        max-backtracks kernel mesh-spacing no-measure; do
         expect_out "--$option"
     done
 done

@@ -1,6 +1,4 @@
-#include "cli.h"
-
-#include "ovoid/surface.h"
+#include "measures.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -41,12 +39,10 @@ typedef struct export_job {
     const char *output;
     const char *device; /* NULL: the default */
     bool quiet;
-    bool format_given;
-    ovoid_molecule_format format;
+    source_format format;
     export_numbers numbers;
     ovoid_context *context;
-    ovoid_model *model; /* one of these two is there */
-    ovoid_molecule *molecule;
+    source source;
 } export_job;
 
 void cli_export_help(FILE *stream) {
@@ -56,7 +52,7 @@ void cli_export_help(FILE *stream) {
           "\n"
           "Writes a model for another program, or the field of a model or a molecule as a density\n"
           "map. INPUT is a model as 'ovoid fit' writes it, or for maps also a molecule (PQR or\n"
-          "XYZR); - is a model, or with --format a molecule, from standard input.\n"
+          "XYZR); - is standard input, and a model unless --format says otherwise.\n"
           "\n"
           "The extension of FILE says what is written:\n"
           "  .bild .bld        ellipsoids for ChimeraX, in one object (as bild)\n"
@@ -71,7 +67,8 @@ void cli_export_help(FILE *stream) {
           "  -o, --output FILE   where it goes, - for standard output\n"
           "  --as NAME           what to write when the extension does not say: bild, cxc, pymol,\n"
           "                      gmm, json, ccp4 or dx\n"
-          "  --format NAME       INPUT is a molecule in this format: pqr or xyzr\n"
+          "  --format NAME       of INPUT: pqr, xyzr or ovoid (default: by its extension, else by\n"
+          "                      its contents)\n"
           "\n"
           "Running:\n"
           "  --device SELECTOR   the device that computes maps, see 'ovoid devices'\n"
@@ -109,18 +106,6 @@ static bool parse_as(const char *text, ovoid_export_format *format) {
     if (*format == OVOID_EXPORT_AUTO)
         cli_error("--as takes bild, cxc, pymol, gmm, json, ccp4 or dx, not '%s'", text);
     return *format != OVOID_EXPORT_AUTO;
-}
-
-static bool parse_molecule_format(const char *text, ovoid_molecule_format *format) {
-    if (strcmp(text, "pqr") == 0) {
-        *format = OVOID_MOLECULE_PQR;
-    } else if (strcmp(text, "xyzr") == 0) {
-        *format = OVOID_MOLECULE_XYZR;
-    } else {
-        cli_error("--format takes pqr or xyzr, not '%s'", text);
-        return false;
-    }
-    return true;
 }
 
 static bool parse_colour(const char *text, double colour[3]) {
@@ -169,8 +154,7 @@ static bool parse_option(int option, export_job *job) {
     case AS:
         return parse_as(optarg, &options->format);
     case FORMAT:
-        job->format_given = true;
-        return parse_molecule_format(optarg, &job->format);
+        return source_parse_format(optarg, &job->format);
     case COLOUR:
         return parse_colour(optarg, options->colour);
     case DEVICE:
@@ -222,12 +206,6 @@ static bool on_progress(uint64_t points, uint64_t total, void *user) {
     return cli_interrupted() == 0;
 }
 
-static ovoid_status read_input(export_job *job) {
-    if (!job->format_given && cli_is_model(job->input))
-        return ovoid_model_read(job->context, job->input, &job->model);
-    return ovoid_molecule_read(job->context, job->input, job->format, &job->molecule);
-}
-
 static ovoid_export_format format_of(const export_job *job) {
     if (job->numbers.options.format != OVOID_EXPORT_AUTO)
         return job->numbers.options.format;
@@ -238,14 +216,14 @@ static ovoid_export_format format_of(const export_job *job) {
 static void print_summary(const export_job *job) {
     if (job->quiet || strcmp(job->output, "-") == 0)
         return;
-    const char *from = strcmp(job->input, "-") == 0 ? "standard input" : job->input;
+    const char *from = source_name(job->input);
     const char *name = ovoid_export_format_name(format_of(job));
-    if (job->model)
-        printf("%s: %zu ellipsoids, written to %s as %s\n", from, ovoid_model_size(job->model),
-               job->output, name);
+    if (job->source.model)
+        printf("%s: %zu ellipsoids, written to %s as %s\n", from,
+               ovoid_model_size(job->source.model), job->output, name);
     else
-        printf("%s: %zu atoms, written to %s as %s\n", from, ovoid_molecule_atoms(job->molecule),
-               job->output, name);
+        printf("%s: %zu atoms, written to %s as %s\n", from,
+               ovoid_molecule_atoms(job->source.molecule), job->output, name);
 }
 
 static int run(export_job *job) {
@@ -254,7 +232,7 @@ static int run(export_job *job) {
     ovoid_status status = ovoid_file_check(job->context, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
-    if ((status = read_input(job)) != OVOID_OK)
+    if ((status = source_read(job->context, job->input, job->format, &job->source)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
     if (format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX)
         status = ovoid_context_open_device(job->context, job->device);
@@ -262,11 +240,11 @@ static int run(export_job *job) {
         return cli_failure(job->context, status, CLI_DEVICE);
     options->progress = on_progress;
     cli_defer_signals();
-    if (job->model)
-        status = ovoid_model_export(job->context, job->model, job->output, options);
+    if (job->source.model)
+        status = ovoid_model_export(job->context, job->source.model, job->output, options);
     else
-        status = ovoid_molecule_export(job->context, job->molecule, job->numbers.decay, job->output,
-                                       options);
+        status = ovoid_molecule_export(job->context, job->source.molecule, job->numbers.decay,
+                                       job->output, options);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     print_summary(job);
@@ -285,8 +263,7 @@ int cli_export(int argc, char **argv) {
             code = CLI_COMPUTE;
         }
     }
-    ovoid_model_destroy(&job.model);
-    ovoid_molecule_destroy(&job.molecule);
+    source_destroy(&job.source);
     ovoid_context_destroy(&job.context);
     return code;
 }

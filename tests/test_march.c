@@ -689,6 +689,23 @@ static void pieces_reach_as_far_as_the_surface(void **state) {
     }
 }
 
+/* Atoms at lattice points whose surfaces end at lattice points: the first or last of a piece, too,
+ * and rounding decides on which side they lie. */
+static void tips_at_the_ends_of_pieces(void **state) {
+    static const uint64_t limits[][3] = {{4, 2, 2}, {4, 4, 6}, {8, 6, 4}};
+    const double decays[] = {0.5, 0.3, 0.77};
+    for (size_t k = 0; k < test_size(27, 1); ++k) {
+        const double xyzr[4] = {1.5, -2.0, 0.5, 1.0 + 0.5 * (double)(k % 3)};
+        const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+        ov_body body;
+        ovoid_mesh *mesh = NULL;
+        ov_body_of_atom(xyzr, decays[k / 3 % 3], &body);
+        test_check(*state, ov_march(*state, &body, 1, &options, limits[k / 9], &mesh));
+        assert_int_equal(expect_closed(mesh), 2);
+        ovoid_mesh_destroy(&mesh);
+    }
+}
+
 static void two_runs_are_the_same(void **state) {
     const size_t count = test_size(600, 20);
     const ovoid_mesh_options options = options_of(1.0, 0.4, OVOID_VERTEX_EXACT);
@@ -824,6 +841,7 @@ int main(void) {
         cmocka_unit_test(far_from_the_origin),
         cmocka_unit_test(memory_follows_the_surface),
         cmocka_unit_test(pieces_reach_as_far_as_the_surface),
+        cmocka_unit_test(tips_at_the_ends_of_pieces),
         cmocka_unit_test(two_runs_are_the_same),
         cmocka_unit_test(a_protein_is_closed),
         cmocka_unit_test(refusals),

@@ -499,7 +499,7 @@ static void sphere_looks_like_one(void **state) {
     const ov_colour own = ov_colour_linear(options.original), haze = ov_colour_linear(0x204060ffu);
     const double extent = sqrt(4.0 + log(1.0 / 0.4) / 0.5); /* what the distance fades over */
     for (uint32_t step = 0; step < 10; ++step) {
-        const uint32_t x = middle - step * middle / 20, y = middle + step * middle / 30;
+        const uint32_t x = middle - step * middle / 18, y = middle + step * middle / 22;
         const double u = pixel * ((double)x - middle), v = pixel * ((double)middle - y);
         const double z = sqrt(4.0 - u * u - v * v), normal[3] = {u / 2.0, v / 2.0, z / 2.0};
         const double colour[3] = {own.rgba[0], own.rgba[1], own.rgba[2]};

@@ -6,10 +6,10 @@ static ovoid_fit_options short_options(void) {
         .method = OVOID_METHOD_L1,
         .decay = 0.5,
         .isovalue = 1.0,
-        .spacing = test_size(80, 120) / 100.0,
+        .spacing = test_size(80, 180) / 100.0,
         .padding = 2.0,
-        .l1 = {.iterations = (uint32_t)test_size(60, 8),
-               .sparse_iterations = (uint32_t)test_size(40, 5),
+        .l1 = {.iterations = (uint32_t)test_size(60, 6),
+               .sparse_iterations = (uint32_t)test_size(40, 4),
                .epsilon = 0.05,
                .max_error = 0.5,
                .prune_below = 1e-3,
@@ -155,7 +155,7 @@ static void two_fits_give_the_same_bits(void **state) {
     ovoid_molecule *molecule = random_molecule(*state, test_size(60, 5), 2);
     ovoid_fit_options options = short_options();
     options.l1.prune_below = 1.6; /* so that pruning takes part */
-    options.l1.prune_every = 6;
+    options.l1.prune_every = 5;
     ovoid_model *models[3] = {0};
     for (int n = 0; n < 3; ++n) {
         ovoid_context *other = NULL;
@@ -383,10 +383,9 @@ static bool readable(const char *path) {
 #define FKBP "/usr/share/apbs/examples/FKBP/"
 
 static void small_molecule(void **state) {
-    if (!readable(FKBP "dmso-min.pqr"))
+    if (test_small() || !readable(FKBP "dmso-min.pqr"))
         skip();
-    fit_file(*state, FKBP "dmso-min.pqr", (uint32_t)test_size(300, 6), (uint32_t)test_size(400, 8),
-             10, 0.14);
+    fit_file(*state, FKBP "dmso-min.pqr", 300, 400, 10, 0.14);
 }
 
 static void protein(void **state) {

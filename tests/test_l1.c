@@ -29,7 +29,7 @@ static ovoid_fit_options options_for(trace *t, uint32_t sparse_iterations, uint3
         .method = OVOID_METHOD_L1,
         .decay = 0.5,
         .isovalue = 1.0,
-        .spacing = test_size(80, 120) / 100.0,
+        .spacing = test_size(80, 180) / 100.0,
         .padding = 2.0,
         .l1 = {.iterations = iterations,
                .sparse_iterations = sparse_iterations,
@@ -209,14 +209,14 @@ static void expect_step(ovoid_context *context, uint32_t sparse_iterations, uint
 }
 
 static void steps_along_the_gradient(void **state) {
-    const uint32_t some = (uint32_t)test_size(30, 8);
+    const uint32_t some = (uint32_t)test_size(30, 4);
     expect_step(*state, some, some);     /* sparse */
     expect_step(*state, some, some + 3); /* accuracy */
 }
 
 /* Every record's weights follow from the record before, and the objective from the weights. */
 static void weights_follow_the_algorithm(void **state) {
-    const uint32_t sparse = (uint32_t)test_size(100, 12), all = (uint32_t)test_size(140, 18);
+    const uint32_t sparse = (uint32_t)test_size(100, 8), all = (uint32_t)test_size(140, 11);
     fit_run run;
     size_t gated = 0, bounded = 0, balanced = 0;
     ovoid_fit_options options = options_for(NULL, sparse, all);
@@ -265,7 +265,7 @@ static void gate_can_be_open_or_shut(void **state) {
     for (size_t n = 0; n < 2; ++n) {
         fit_run run;
         ovoid_fit_options options =
-            options_for(NULL, (uint32_t)test_size(40, 8), (uint32_t)test_size(40, 8));
+            options_for(NULL, (uint32_t)test_size(40, 4), (uint32_t)test_size(40, 4));
         options.l1.max_error = gates[n];
         run_fit(*state, clump, ATOMS, &options, &run);
         /* from the second on: the start may be exact */
@@ -279,7 +279,7 @@ static void gate_can_be_open_or_shut(void **state) {
 /* A step that is taken lowers the objective, under the weights of its own iteration. In the
  * accuracy phase these do not change, so there the objective never rises. */
 static void accepted_steps_descend(void **state) {
-    const uint32_t sparse = (uint32_t)test_size(120, 10), all = (uint32_t)test_size(300, 20);
+    const uint32_t sparse = (uint32_t)test_size(120, 6), all = (uint32_t)test_size(300, 10);
     const ovoid_first_step first_steps[] = {OVOID_FIRST_STEP_SECANT, OVOID_FIRST_STEP_GROW};
     for (size_t which = 0; which < 2; ++which) {
         fit_run run;
@@ -310,7 +310,8 @@ static void accepted_steps_descend(void **state) {
 /* Ellipsoids go at multiples of prune_every only. */
 static void pruning_keeps_its_schedule(void **state) {
     fit_run run;
-    ovoid_fit_options options = options_for(NULL, 30, 30);
+    ovoid_fit_options options =
+        options_for(NULL, (uint32_t)test_size(30, 14), (uint32_t)test_size(30, 14));
     options.l1.prune_every = 7;
     options.l1.prune_below = 1.3; /* c begins between 1.28 and 2.06, and the L1 term lowers it */
     options.l1.max_error = INFINITY;
@@ -374,7 +375,7 @@ static void pruning_leaves_one(void **state) {
 static void sparse_phase_shrinks_the_l1_term(void **state) {
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(200, 20), (uint32_t)test_size(200, 20));
+        options_for(NULL, (uint32_t)test_size(200, 8), (uint32_t)test_size(200, 8));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const first = &run.trace.records[0];
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];

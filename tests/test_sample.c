@@ -139,7 +139,11 @@ static void small_molecule(void **state) {
     double xyzr[4 * ATOMS];
     test_random random = {1};
     random_atoms(&random, xyzr, ATOMS, (const double[3]){3.0, 2.0, 2.5});
-    job j = {.xyzr = xyzr, .atoms = ATOMS, .decay = 0.5, .spacing = 0.7, .padding = 2.0};
+    job j = {.xyzr = xyzr,
+             .atoms = ATOMS,
+             .decay = 0.5,
+             .spacing = test_size(70, 110) / 100.0,
+             .padding = 2.0};
     const ov_band bands[] = {{0.0, 2.0}, {0.02, 2.0}, {0.5, 2.5}, {-0.5, 1.5}};
     size_t count[4];
     for (size_t n = 0; n < 4; ++n) {

@@ -19,11 +19,19 @@ typedef float ov_f32;
 #define OV_PACK 16
 /* Work-items that share a term where packs have several lanes: one warp. */
 #define OV_TEAM 32
+/* Lattice points in bricks are packs: x runs fastest. */
+#define OV_BRICK_X 4
+#define OV_BRICK_Y 2
+#define OV_BRICK_Z 2
 /* Boxes in a group of the tree over packs or terms, and levels of that tree (16^7 leaves). */
 #define OV_GROUP 16
 #define OV_LEVELS 7
 /* Monomials of degree up to 2 in z = y - centre: 1, x, y, z, xx, xy, xz, yy, yz, zz. */
 #define OV_MONOMIALS 10
+
+/* Triangles in a leaf of the tree over a mesh, and floats of each (kernels/distance.cl). */
+#define OV_LEAF 16
+#define OV_TRIANGLE 18
 
 /* One ellipsoid as the kernels see it: 2^(log2_amplitude - q(z)), q(z) = z^T A z with A already
  * multiplied by log2(e). Coordinates are relative to the points' origin, in angstrom. */

@@ -6,10 +6,10 @@
 
 #include <cmocka.h>
 
+#include "comma.h"
 #include "ovoid/ovoid.h"
 #include "scratch.h"
 
-#include <locale.h>
 #include <math.h>
 
 static ovoid_context *context;
@@ -353,24 +353,10 @@ static void standard_input_is_read(void **state) {
 
 /* ---- locale ------------------------------------------------------------------------------- */
 
-/* Enters a locale with a decimal comma: one of the system, else one made in the scratch folder. */
-static bool enter_comma_locale(scratch *s) {
-    static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "de_DE"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (setlocale(LC_ALL, names[i]))
-            return localeconv()->decimal_point[0] == ',';
-    char command[512];
-    snprintf(command, sizeof command,
-             "localedef -i de_DE -f UTF-8 '%s/de_DE.UTF-8' >/dev/null 2>&1", s->folder);
-    if (system(command) != 0 || setenv("LOCPATH", s->folder, 1) != 0)
-        return false;
-    return setlocale(LC_ALL, "de_DE.UTF-8") && localeconv()->decimal_point[0] == ',';
-}
-
 static void locale_changes_nothing(void **state) {
     scratch *s = *state;
     ovoid_model *model = NULL;
-    if (!enter_comma_locale(s)) {
+    if (!comma_enter(s)) {
         setlocale(LC_ALL, "C");
         print_message("no locale with a decimal comma here\n");
         skip();
@@ -379,13 +365,7 @@ static void locale_changes_nothing(void **state) {
     write_plain(path);
     char *text = scratch_read(path);
     ovoid_status status = ovoid_model_read(context, path, &model);
-    char comma[16];
-    snprintf(comma, sizeof comma, "%.1f", 0.5); /* the caller's locale is as it was */
-    setlocale(LC_ALL, "C");
-    char command[512];
-    snprintf(command, sizeof command, "rm -rf '%s/de_DE.UTF-8'", s->folder);
-    (void)!system(command);
-    assert_string_equal(comma, "0,5");
+    assert_true(comma_leave(s)); /* the caller's locale is as it was */
     assert_string_equal(text, plain_file);
     free(text);
     assert_int_equal(status, OVOID_OK);

@@ -120,12 +120,26 @@ bool cli_json_string(cJSON *object, const char *key, const char *text);
 /* Writes the JSON text and a line end whole or not at all. */
 ovoid_status cli_json_write(ovoid_context *context, const cJSON *json, const char *path);
 
+/* ---- input.c -------------------------------------------------------------------------------- */
+
+/* Whether a file is a model rather than a molecule: by its extension, else by how it begins.
+ * Standard input counts as a model. */
+bool cli_is_model(const char *path);
+
 /* ---- subcommands ---------------------------------------------------------------------------- */
 
 int cli_fit(int argc, char **argv);
+int cli_mesh(int argc, char **argv);
+int cli_measure(int argc, char **argv);
+int cli_render(int argc, char **argv);
 int cli_devices(int argc, char **argv);
+int cli_export(int argc, char **argv);
 
 void cli_fit_help(FILE *stream);
+void cli_mesh_help(FILE *stream);
+void cli_measure_help(FILE *stream);
+void cli_render_help(FILE *stream);
 void cli_devices_help(FILE *stream);
+void cli_export_help(FILE *stream);
 
 #endif

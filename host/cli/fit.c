@@ -56,8 +56,8 @@ static void print_settings(const fit_job *job, char *text, size_t size) {
         used += (size_t)snprintf(text + used, size - used, ", %s %.9g", fit_l1_numbers[i].name,
                                  cli_number_value(&fit_l1_numbers[i], options));
     if (used < size)
-        snprintf(text + used, size - used, ", first-step %s",
-                 fit_first_step_name(options->l1.first_step));
+        snprintf(text + used, size - used, ", kernel %s, first-step %s",
+                 fit_kernel_name(options->l1.kernel), fit_first_step_name(options->l1.first_step));
 }
 
 /* The model file says where it comes from. */
@@ -106,6 +106,26 @@ static ovoid_status fit(fit_job *job) {
     return status;
 }
 
+/* Compares the surfaces. The model is worth more than its measures: without them it is written,
+ * too. *code is CLI_OK where there is nothing to measure, such as a model without a surface. */
+static void measure(fit_job *job, int *code) {
+    *code = CLI_OK;
+    if (!job->measure)
+        return;
+    double begin = cli_seconds();
+    job->measuring.isovalue = job->options.isovalue;
+    ovoid_status status =
+        ovoid_measure(job->context, job->molecule, job->model, &job->measuring, &job->measures);
+    job->measured = status == OVOID_OK;
+    if (status == OVOID_ERROR_EMPTY) {
+        if (!job->quiet)
+            cli_warning("not measured: %s", ovoid_context_error(job->context));
+    } else if (status != OVOID_OK && !cli_interrupted()) {
+        *code = cli_failure(job->context, status, CLI_OUTPUT);
+    }
+    job->measure_seconds = cli_seconds() - begin;
+}
+
 /* Writes the model, then the trace, then the report, which tells how long the others took. The
  * model is worth more than the others: their failure does not undo it. */
 static int write_outputs(fit_job *job) {
@@ -136,12 +156,16 @@ static int run(fit_job *job) {
     if ((status = open_device(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     fit_summary_before(job);
+    int measured = CLI_OK;
     status = fit(job);
+    if (status == OVOID_OK && !cli_interrupted())
+        measure(job, &measured);
     if (status == OVOID_OK && cli_interrupted())
         status = OVOID_ERROR_CANCELLED;
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
-    return write_outputs(job);
+    int written = write_outputs(job);
+    return written == CLI_OK ? measured : written;
 }
 
 int cli_fit(int argc, char **argv) {

@@ -4,7 +4,7 @@
 #ifndef CLI_FIT_H
 #define CLI_FIT_H
 
-#include "cli.h"
+#include "measures.h"
 
 /* Records every iteration in a CSV file. A trace that cannot be written ends without ending the
  * fit: the model is worth more. */
@@ -25,6 +25,8 @@ typedef struct fit_job {
     bool quiet;
     ovoid_molecule_format format;
     ovoid_fit_options options;
+    bool measure; /* compare the surfaces at the end */
+    ovoid_measure_options measuring;
 
     /* what came of it */
     FILE *summary; /* NULL: none */
@@ -32,9 +34,11 @@ typedef struct fit_job {
     ovoid_molecule *molecule;
     ovoid_model *model;
     ovoid_fit_result result;
+    bool measured;
+    ovoid_measures measures;
     fit_trace tracer;
     bool report_failed;
-    double started, device_seconds, read_seconds, write_seconds, total_seconds;
+    double started, device_seconds, read_seconds, measure_seconds, write_seconds, total_seconds;
 } fit_job;
 
 /* ---- fit_options.c -------------------------------------------------------------------------- */
@@ -43,6 +47,7 @@ typedef struct fit_job {
 bool fit_options_parse(int argc, char **argv, fit_job *job, int *code);
 
 const char *fit_method_name(ovoid_method method);
+const char *fit_kernel_name(ovoid_kernel kernel);
 const char *fit_first_step_name(ovoid_first_step first_step);
 
 /* The numbers of ovoid_fit_options that options set, apart for the surface and for method l1. */

@@ -1,7 +1,6 @@
 #include "fit.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define REAL(name, member, low, above, high, below, unit, help)                                    \
@@ -44,13 +43,38 @@ const cli_number fit_l1_numbers[] = {
 };
 const size_t fit_l1_count = sizeof fit_l1_numbers / sizeof *fit_l1_numbers;
 
+static const cli_number mesh_spacing = {
+    "mesh-spacing",
+    CLI_REAL,
+    offsetof(ovoid_measure_options, spacing),
+    0,
+    1e3,
+    true,
+    false,
+    "Å",
+    "of the meshes on which the model's surface is measured at the end"};
+
 enum {
     SURFACE_COUNT = sizeof fit_surface_numbers / sizeof *fit_surface_numbers,
     L1_COUNT = sizeof fit_l1_numbers / sizeof *fit_l1_numbers
 };
 
 /* Values of the long options; those of the numbers follow. */
-enum { OUTPUT = 256, METHOD, DEVICE, REPORT, TRACE, QUIET, FORMAT, FIRST_STEP, HELP, NUMBERS };
+enum {
+    OUTPUT = 256,
+    METHOD,
+    DEVICE,
+    REPORT,
+    TRACE,
+    QUIET,
+    FORMAT,
+    KERNEL,
+    FIRST_STEP,
+    NO_MEASURE,
+    MESH_SPACING,
+    HELP,
+    NUMBERS
+};
 
 static const struct option named[] = {
     {"output", required_argument, NULL, OUTPUT},
@@ -60,7 +84,10 @@ static const struct option named[] = {
     {"trace", required_argument, NULL, TRACE},
     {"quiet", no_argument, NULL, QUIET},
     {"format", required_argument, NULL, FORMAT},
+    {"kernel", required_argument, NULL, KERNEL},
     {"first-step", required_argument, NULL, FIRST_STEP},
+    {"no-measure", no_argument, NULL, NO_MEASURE},
+    {"mesh-spacing", required_argument, NULL, MESH_SPACING},
     {"help", no_argument, NULL, HELP},
 };
 enum { NAMED_COUNT = sizeof named / sizeof *named };
@@ -79,6 +106,16 @@ const char *fit_method_name(ovoid_method method) {
     return "unknown";
 }
 
+const char *fit_kernel_name(ovoid_kernel kernel) {
+    switch (kernel) {
+    case OVOID_KERNEL_ELLIPSOID:
+        return "ellipsoid";
+    case OVOID_KERNEL_SPHERE:
+        return "sphere";
+    }
+    return "unknown";
+}
+
 const char *fit_first_step_name(ovoid_first_step first_step) {
     switch (first_step) {
     case OVOID_FIRST_STEP_SECANT:
@@ -91,7 +128,9 @@ const char *fit_first_step_name(ovoid_first_step first_step) {
 
 void cli_fit_help(FILE *stream) {
     ovoid_fit_options defaults;
+    ovoid_measure_options measuring;
     ovoid_fit_options_init(&defaults);
+    ovoid_measure_options_init(&measuring);
     fprintf(
         stream,
         "Usage: ovoid fit MOLECULE [OPTION]...\n"
@@ -123,7 +162,16 @@ void cli_fit_help(FILE *stream) {
         fit_method_name(defaults.method));
     for (size_t i = 0; i < fit_surface_count; i++)
         cli_number_help(&fit_surface_numbers[i], &defaults, stream);
-    fputs("\nMethod l1:\n", stream);
+    fputs("\nThe measures of the surface at the end:\n", stream);
+    cli_number_help(&mesh_spacing, &measuring, stream);
+    fputs("  --no-measure        leave them out\n\nMethod l1:\n", stream);
+    fprintf(
+        stream,
+        "  --kernel NAME       what an atom's Gaussian may become: ellipsoid (everything about\n"
+        "                      it moves), or sphere (stays where it is and as wide, only its\n"
+        "                      amplitude moves: the sparse RBF model in Table 1 of the paper)\n"
+        "                      (default %s)\n",
+        fit_kernel_name(defaults.l1.kernel));
     for (size_t i = 0; i < fit_l1_count; i++)
         cli_number_help(&fit_l1_numbers[i], &defaults, stream);
     fprintf(
@@ -156,6 +204,18 @@ static bool parse_method(const char *text, ovoid_method *method) {
     return true;
 }
 
+static bool parse_kernel(const char *text, ovoid_kernel *kernel) {
+    if (strcmp(text, fit_kernel_name(OVOID_KERNEL_ELLIPSOID)) == 0) {
+        *kernel = OVOID_KERNEL_ELLIPSOID;
+    } else if (strcmp(text, fit_kernel_name(OVOID_KERNEL_SPHERE)) == 0) {
+        *kernel = OVOID_KERNEL_SPHERE;
+    } else {
+        cli_error("--kernel takes ellipsoid or sphere, not '%s'", text);
+        return false;
+    }
+    return true;
+}
+
 static bool parse_first_step(const char *text, ovoid_first_step *first_step) {
     if (strcmp(text, fit_first_step_name(OVOID_FIRST_STEP_SECANT)) == 0) {
         *first_step = OVOID_FIRST_STEP_SECANT;
@@ -166,38 +226,6 @@ static bool parse_first_step(const char *text, ovoid_first_step *first_step) {
         return false;
     }
     return true;
-}
-
-static bool parse_format(const char *text, ovoid_molecule_format *format) {
-    if (strcmp(text, "pqr") == 0) {
-        *format = OVOID_MOLECULE_PQR;
-    } else if (strcmp(text, "xyzr") == 0) {
-        *format = OVOID_MOLECULE_XYZR;
-    } else {
-        cli_error("--format takes pqr or xyzr, not '%s'", text);
-        return false;
-    }
-    return true;
-}
-
-/* The molecule's name without folder, .gz and extension, with .ovoid. */
-static char *default_output(const char *input) {
-    const char *slash = strrchr(input, '/');
-    const char *base = slash ? slash + 1 : input;
-    size_t length = strlen(base);
-    if (length > 3 && strcmp(base + length - 3, ".gz") == 0)
-        length -= 3;
-    for (size_t i = length; i-- > 1;) /* a dot in front makes no extension */
-        if (base[i] == '.') {
-            length = i;
-            break;
-        }
-    char *name = malloc(length + sizeof ".ovoid");
-    if (name) {
-        memcpy(name, base, length);
-        memcpy(name + length, ".ovoid", sizeof ".ovoid");
-    }
-    return name;
 }
 
 /* What goes where must be told apart before anything is written. */
@@ -239,7 +267,7 @@ static bool complete(int argc, char **argv, fit_job *job, bool iterations, bool 
         return false;
     }
     if (!job->output)
-        job->output = job->default_output = default_output(job->input);
+        job->output = job->default_output = source_output(job->input, ".ovoid");
     if (!job->output) {
         cli_error("out of memory");
         return false;
@@ -273,6 +301,8 @@ bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
     int option;
     fill_long_options(all);
     ovoid_fit_options_init(&job->options);
+    ovoid_measure_options_init(&job->measuring);
+    job->measure = true;
     opterr = 0;
     *code = CLI_USAGE;
     while (good && (option = getopt_long(argc, argv, ":o:qh", all, NULL)) != -1) {
@@ -298,10 +328,19 @@ bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
             job->quiet = true;
             break;
         case FORMAT:
-            good = parse_format(optarg, &job->format);
+            good = source_parse_molecule(optarg, &job->format);
+            break;
+        case KERNEL:
+            good = parse_kernel(optarg, &job->options.l1.kernel);
             break;
         case FIRST_STEP:
             good = parse_first_step(optarg, &job->options.l1.first_step);
+            break;
+        case NO_MEASURE:
+            job->measure = false;
+            break;
+        case MESH_SPACING:
+            good = cli_number_parse(&mesh_spacing, optarg, &job->measuring);
             break;
         case 'h':
         case HELP:

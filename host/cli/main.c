@@ -18,6 +18,10 @@ typedef struct subcommand {
 
 static const subcommand subcommands[] = {
     {"fit", "fit a sparse model to a molecule's surface", cli_fit, cli_fit_help},
+    {"mesh", "write a surface as a triangle mesh", cli_mesh, cli_mesh_help},
+    {"measure", "compare a model's surface with its molecule's", cli_measure, cli_measure_help},
+    {"export", "write a model or a field for another program", cli_export, cli_export_help},
+    {"render", "take a picture of a molecule's and a model's surface", cli_render, cli_render_help},
     {"devices", "list the OpenCL devices", cli_devices, cli_devices_help},
 };
 enum { SUBCOMMANDS = sizeof subcommands / sizeof subcommands[0] };
@@ -220,7 +224,10 @@ static void open_standard_streams(void) {
 }
 
 int main(int argc, char **argv) {
+    static char buffer[1 << 16]; /* for any help, so that the flush below knows why it failed */
     open_standard_streams();
+    if (!isatty(STDOUT_FILENO))
+        setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     cli_catch_signals();
     int code = run(argc, argv);
     errno = 0;

@@ -81,6 +81,7 @@ static void add_times(builder *b, const fit_job *job) {
     add_seconds(&seconds, "read", job->read_seconds);
     add_seconds(&seconds, "sample", job->result.sample_seconds);
     add_seconds(&seconds, "fit", job->result.fit_seconds);
+    add_seconds(&seconds, "measure", job->measure_seconds);
     add_seconds(&seconds, "write", job->write_seconds);
     add_seconds(&seconds, "total", job->total_seconds);
     b->good = seconds.good;
@@ -106,9 +107,12 @@ ovoid_status fit_report_write(const fit_job *job) {
     add_numbers(&b, fit_surface_numbers, fit_surface_count, &job->options);
     builder options = add_object(&b, "options");
     add_numbers(&options, fit_l1_numbers, fit_l1_count, &job->options);
+    add_string(&options, "kernel", fit_kernel_name(job->options.l1.kernel));
     add_string(&options, "first_step", fit_first_step_name(job->options.l1.first_step));
     b.good = options.good;
     add_result(&b, job);
+    if (job->measured)
+        b.good = b.good && measures_report(b.object, &job->measures, &job->measuring);
     add_device(&b, ovoid_context_device(job->context));
     add_times(&b, job);
     ovoid_status status =

@@ -54,16 +54,21 @@ void fit_summary_after(const fit_job *job) {
     fprintf(out, "points    %llu, spacing %.9g Å, padding %.9g Å\n", (count)result->points,
             options->spacing, options->padding);
     const count atoms = ovoid_molecule_atoms(job->molecule);
-    fprintf(out, "fit       %llu iteration%s of method %s\n", (count)result->iterations,
-            plural(result->iterations), fit_method_name(options->method));
+    fprintf(out, "fit       %llu iteration%s of method %s%s\n", (count)result->iterations,
+            plural(result->iterations), fit_method_name(options->method),
+            options->l1.kernel == OVOID_KERNEL_SPHERE ? ", spheres at the atoms" : "");
     fprintf(out, "model     %llu ellipsoid%s for %llu atom%s: sparse ratio %.3g\n",
             (count)result->ellipsoids, plural(result->ellipsoids), atoms, plural(atoms),
             (double)result->ellipsoids / (double)atoms);
     fprintf(out, "error     rms %.3g, largest %.3g (of the field, over the points)\n",
             result->rms_error, result->max_error);
-    fprintf(out, "time      %.2f s: device %.2f, read %.2f, sample %.2f, fit %.2f, write %.2f\n",
+    if (job->measured)
+        measures_print(out, &job->measures, &job->measuring);
+    fprintf(out,
+            "time      %.2f s: device %.2f, read %.2f, sample %.2f, fit %.2f, measure %.2f, write "
+            "%.2f\n",
             job->total_seconds, job->device_seconds, job->read_seconds, result->sample_seconds,
-            result->fit_seconds, job->write_seconds);
+            result->fit_seconds, job->measure_seconds, job->write_seconds);
     print_written(out, "model", job->output);
     if (job->report && !job->report_failed)
         print_written(out, "report", job->report);

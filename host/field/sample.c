@@ -1,18 +1,12 @@
-#include "field/field.h"
+#include "field/bricks.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* A brick of lattice points is one pack. */
-#define BRICK_X 4
-#define BRICK_Y 2
-#define BRICK_Z 2
-_Static_assert(BRICK_X *BRICK_Y *BRICK_Z == OV_PACK, "a brick is a pack");
-
 /* Largest piece of the lattice that is evaluated at once: a million points, 16 MB on the device. */
 static const uint64_t piece_limit[3] = {128, 128, 64};
-static const uint64_t brick[3] = {BRICK_X, BRICK_Y, BRICK_Z};
+static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
 /* The lattice cut into equal pieces of whole bricks; the last pieces may reach past its end. */
 typedef struct piece_grid {
@@ -42,6 +36,7 @@ typedef struct sampler {
     ov_operations operations;
     ov_buffer value;
     float *values;        /* of one piece */
+    uint32_t *order;      /* its packs as bricks */
     ov_quadric *quadrics; /* of one piece's atoms */
     size_t quadrics_capacity;
     float *kept;                      /* x, y, z relative to origin */
@@ -149,46 +144,21 @@ fail:
     return OVOID_ERROR_MEMORY;
 }
 
-/* Fills one brick's packed coordinates and box; at: index of its first point within the piece. */
-static void lay_brick(const ov_lattice *lattice, const uint64_t at[3], float *packed, float *box) {
-    for (uint64_t j = 0; j < OV_PACK; ++j) {
-        const uint64_t within[3] = {j % BRICK_X, j / BRICK_X % BRICK_Y, j / (BRICK_X * BRICK_Y)};
-        for (size_t axis = 0; axis < 3; ++axis) {
-            const float x = (float)((double)(at[axis] + within[axis]) * lattice->step[axis]);
-            packed[axis * OV_PACK + j] = x;
-            if (j == 0)
-                box[axis] = x;
-            if (j == OV_PACK - 1)
-                box[axis + 3] = x;
-        }
-    }
-}
-
-/* The bricks of a piece, in raster order; the same for all pieces since each has its own origin. */
+/* The bricks of a piece, along a curve, as the tree over them wants it; the same for all pieces
+ * since each has its own origin. */
 static ovoid_status lay_piece(ovoid_context *context, sampler *s) {
-    ovoid_status status = OVOID_OK;
-    const uint64_t *const size = s->pieces.size;
-    const size_t packs = (size_t)(size[0] * size[1] * size[2] / OV_PACK);
-    float *const packed = ov_alloc(context, packs * 3 * OV_PACK, sizeof *packed, "lattice points");
-    float *const boxes = ov_alloc(context, packs * 6, sizeof *boxes, "lattice bricks");
+    uint64_t bricks[3];
+    for (size_t axis = 0; axis < 3; ++axis)
+        bricks[axis] = s->pieces.size[axis] / brick[axis];
+    const size_t packs = (size_t)(bricks[0] * bricks[1] * bricks[2]);
+    s->order = ov_alloc(context, packs, sizeof *s->order, "lattice bricks");
     s->values = ov_alloc(context, packs * OV_PACK, sizeof *s->values, "lattice values");
-    if (!packed || !boxes || !s->values) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    size_t pack = 0;
-    for (uint64_t z = 0; z < size[2]; z += BRICK_Z)
-        for (uint64_t y = 0; y < size[1]; y += BRICK_Y)
-            for (uint64_t x = 0; x < size[0]; x += BRICK_X, ++pack)
-                lay_brick(s->lattice, (const uint64_t[3]){x, y, z}, packed + pack * (3 * OV_PACK),
-                          boxes + pack * 6);
-    s->points.count = packs * OV_PACK;
-    s->points.packs = packs;
-    OV_TRY(ov_points_upload(context, packed, boxes, &s->points));
-cleanup:
-    free(packed);
-    free(boxes);
-    return status;
+    if (!s->order || !s->values)
+        return OVOID_ERROR_MEMORY;
+    const ovoid_status status = ov_bricks_order(context, bricks, s->order);
+    if (status != OVOID_OK)
+        return status;
+    return ov_bricks_upload(context, bricks, s->order, s->lattice->step, &s->points);
 }
 
 /* phi at the points of one piece, into s->values. */
@@ -255,7 +225,7 @@ static ovoid_status check_empty_pieces(ovoid_context *context, const sampler *s)
 /* Appends the piece's points that lie on the lattice and in the band. */
 static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t at[3]) {
     const uint64_t *const size = s->pieces.size;
-    const uint64_t row = size[0] / BRICK_X, rows = size[1] / BRICK_Y;
+    const uint64_t row = size[0] / OV_BRICK_X, rows = size[1] / OV_BRICK_Y;
     const ovoid_status status =
         ov_grow(context, &s->kept, &s->kept_capacity, 3 * (s->kept_count + s->points.count),
                 sizeof *s->kept, "constrained points");
@@ -264,11 +234,13 @@ static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t
     for (size_t k = 0; k < s->points.count; ++k) {
         if (!(s->values[k] >= s->band.low && s->values[k] <= s->band.high))
             continue;
-        const uint64_t pack = k / OV_PACK, j = k % OV_PACK;
+        const uint64_t pack = s->order[k / OV_PACK];
+        uint64_t within[3];
+        ov_brick_point(k % OV_PACK, within);
         const uint64_t index[3] = {
-            at[0] + pack % row * BRICK_X + j % BRICK_X,
-            at[1] + pack / row % rows * BRICK_Y + j / BRICK_X % BRICK_Y,
-            at[2] + pack / (row * rows) * BRICK_Z + j / (BRICK_X * BRICK_Y),
+            at[0] + pack % row * OV_BRICK_X + within[0],
+            at[1] + pack / row % rows * OV_BRICK_Y + within[1],
+            at[2] + pack / (row * rows) * OV_BRICK_Z + within[2],
         };
         if (index[0] >= s->lattice->size[0] || index[1] >= s->lattice->size[1] ||
             index[2] >= s->lattice->size[2])
@@ -333,6 +305,7 @@ static void destroy_sampler(sampler *s) {
     free(s->pieces.start);
     free(s->pieces.atom);
     free(s->values);
+    free(s->order);
     free(s->quadrics);
     free(s->kept);
     ov_points_destroy(&s->points);

@@ -97,15 +97,16 @@ static ovoid_status line_search(fit *f, ov_l1_weights w, ov_l1_evaluation *now, 
     *tau = 0.0;
     if (!(largest > 0.0))
         return OVOID_OK;
-    const double before = w.accuracy * now->accuracy + w.sparse * ov_l1_sparse_term(f->x, f->count);
+    const double before =
+        w.accuracy * now->accuracy + w.sparse * ov_l1_sparse_term(&f->objective, f->x, f->count);
     double step = first_step(f, size, largest);
     for (uint32_t k = 0; k < l1->max_backtracks; ++k, step *= l1->shrink) {
         for (size_t j = 0; j < size; ++j)
             f->trial[j] = f->x[j] - step * f->gradient[j];
         ov_l1_evaluation tried;
         OV_TRY(ov_l1_evaluate(&f->objective, f->trial, f->count, &tried));
-        const double after =
-            w.accuracy * tried.accuracy + w.sparse * ov_l1_sparse_term(f->trial, f->count);
+        const double after = w.accuracy * tried.accuracy +
+                             w.sparse * ov_l1_sparse_term(&f->objective, f->trial, f->count);
         if (after <= before - l1->armijo * step * square) {
             double *const swap = f->x;
             f->x = f->trial;
@@ -124,7 +125,7 @@ static bool report(const fit *f, uint64_t iteration, bool accuracy_phase, ov_l1_
                    ov_l1_evaluation now, double tau, double began) {
     if (!f->options->progress)
         return true;
-    const double sparse = ov_l1_sparse_term(f->x, f->count);
+    const double sparse = ov_l1_sparse_term(&f->objective, f->x, f->count);
     const ovoid_progress progress = {
         .stage = accuracy_phase ? "accuracy" : "sparse",
         .iteration = iteration,
@@ -160,8 +161,8 @@ static ovoid_status iterate(fit *f, double began, ov_l1_evaluation *now, uint64_
             failures > 0) /* after a failure the device holds a rejected trial's residual */
             OV_TRY(ov_l1_evaluate(&f->objective, f->x, f->count, now));
         const bool accuracy_phase = n > sparse_end;
-        const ov_l1_weights w =
-            choose_weights(l1, *now, ov_l1_sparse_term(f->x, f->count), accuracy_phase);
+        const ov_l1_weights w = choose_weights(
+            l1, *now, ov_l1_sparse_term(&f->objective, f->x, f->count), accuracy_phase);
         const bool alone = w.sparse == 0.0;
         OV_TRY(next_gradient(f, w));
         f->comparable = alone && alone_before && !pruned;
@@ -209,7 +210,7 @@ static ovoid_status allocate(fit *f, ovoid_context *context, const ov_samples *s
         if (!(*vectors[k] =
                   ov_alloc(context, f->count * OV_L1_PARAMETERS, sizeof(double), "parameters")))
             return OVOID_ERROR_MEMORY;
-    return ov_l1_objective_create(context, samples, f->count, &f->objective);
+    return ov_l1_objective_create(context, samples, f->options->l1.kernel, f->count, &f->objective);
 }
 
 static void destroy(fit *f) {

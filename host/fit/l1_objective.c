@@ -108,10 +108,16 @@ cleanup:
     return status;
 }
 
-double ov_l1_sparse_term(const double *x, size_t count) {
+/* The parameters that E_l1 acts on, the first of each ellipsoid. */
+static size_t penalised(const ov_l1_objective *objective) {
+    return objective->kernel == OVOID_KERNEL_SPHERE ? OV_L1_D : OV_L1_CENTRE;
+}
+
+double ov_l1_sparse_term(const ov_l1_objective *objective, const double *x, size_t count) {
+    const size_t parameters = penalised(objective);
     double sum = 0.0;
     for (size_t i = 0; i < count; ++i)
-        for (size_t j = 0; j < OV_L1_CENTRE; ++j)
+        for (size_t j = 0; j < parameters; ++j)
             sum += fabs(x[i * OV_L1_PARAMETERS + j]);
     return sum;
 }
@@ -119,6 +125,7 @@ double ov_l1_sparse_term(const double *x, size_t count) {
 ovoid_status ov_l1_gradient(ov_l1_objective *objective, const double *x, size_t count,
                             ov_l1_weights w, double *gradient) {
     ovoid_status status = OVOID_OK;
+    const size_t parameters = penalised(objective);
     const double start = ov_seconds();
     OV_TRY(ov_moments(objective->context, &objective->operations, &objective->samples->points,
                       &objective->terms, &objective->lists, &objective->residual,
@@ -137,8 +144,11 @@ ovoid_status ov_l1_gradient(ov_l1_objective *objective, const double *x, size_t 
             sums[m] = 2.0 * w.accuracy * ((double)pair[0] + pair[1]);
         }
         ov_l1_chain(p, sums, g);
-        for (size_t j = 0; j < OV_L1_CENTRE; ++j)
+        for (size_t j = 0; j < parameters; ++j)
             g[j] += w.sparse * ((p[j] > 0.0) - (p[j] < 0.0));
+        for (size_t j = OV_L1_D; objective->kernel == OVOID_KERNEL_SPHERE && j < OV_L1_PARAMETERS;
+             ++j)
+            g[j] = 0.0;
     }
     objective->profile.host_seconds += ov_seconds() - read;
 cleanup:
@@ -146,8 +156,10 @@ cleanup:
 }
 
 ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *samples,
-                                    size_t ellipsoids, ov_l1_objective *objective) {
-    ov_l1_objective made = {.context = context, .samples = samples, .skin = SKIN_FIRST};
+                                    ovoid_kernel kernel, size_t ellipsoids,
+                                    ov_l1_objective *objective) {
+    ov_l1_objective made = {
+        .context = context, .samples = samples, .kernel = kernel, .skin = SKIN_FIRST};
     made.listed =
         ov_alloc(context, ellipsoids * OV_L1_PARAMETERS, sizeof *made.listed, "parameters");
     made.quadrics = ov_alloc(context, ellipsoids, sizeof *made.quadrics, "ellipsoids");

@@ -21,6 +21,7 @@ typedef struct ov_l1_weights {
 typedef struct ov_l1_objective {
     ovoid_context *context;
     const ov_samples *samples;
+    ovoid_kernel kernel;
     double *listed; /* parameters that the lists were built for, listed_count ellipsoids */
     size_t listed_count;
     double skin;        /* of the lists, angstrom */
@@ -37,7 +38,8 @@ typedef struct ov_l1_objective {
 
 /* Room for up to `ellipsoids` of them. samples must outlive the objective. */
 ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *samples,
-                                    size_t ellipsoids, ov_l1_objective *objective);
+                                    ovoid_kernel kernel, size_t ellipsoids,
+                                    ov_l1_objective *objective);
 void ov_l1_objective_destroy(ov_l1_objective *objective);
 
 /* phi~ and the residual at all points for the parameters x, OV_L1_PARAMETERS per ellipsoid. The
@@ -46,10 +48,12 @@ void ov_l1_objective_destroy(ov_l1_objective *objective);
 ovoid_status ov_l1_evaluate(ov_l1_objective *objective, const double *x, size_t count,
                             ov_l1_evaluation *result);
 
-/* E_l1 = sum |c| + |d_1| + |d_2| + |d_3| (eq. 3.3, on the substituted variables). */
-double ov_l1_sparse_term(const double *x, size_t count);
+/* E_l1 = sum |c| + |d_1| + |d_2| + |d_3| (eq. 3.3, on the substituted variables); sum |c| of
+ * spheres. */
+double ov_l1_sparse_term(const ov_l1_objective *objective, const double *x, size_t count);
 
-/* Gradient of w_s E_s + w_l E_l1 at the parameters x evaluated last; |t|' is taken as 0 at 0. */
+/* Gradient of w_s E_s + w_l E_l1 at the parameters x evaluated last; |t|' is taken as 0 at 0,
+ * and the gradient of what the kernel holds fixed as 0. */
 ovoid_status ov_l1_gradient(ov_l1_objective *objective, const double *x, size_t count,
                             ov_l1_weights w, double *gradient);
 

@@ -13,6 +13,7 @@ void ovoid_fit_options_init(ovoid_fit_options *options) {
         .padding = 3.0,
         .l1 =
             {
+                .kernel = OVOID_KERNEL_ELLIPSOID,
                 .iterations = 8000,
                 .sparse_iterations = 6000,
                 .epsilon = 0.05,
@@ -52,6 +53,8 @@ ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_option
     };
     if (options->method != OVOID_METHOD_L1)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown method %d", (int)options->method);
+    if (l1->kernel != OVOID_KERNEL_ELLIPSOID && l1->kernel != OVOID_KERNEL_SPHERE)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown kernel %d", (int)l1->kernel);
     if (l1->first_step != OVOID_FIRST_STEP_SECANT && l1->first_step != OVOID_FIRST_STEP_GROW)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown first step %d", (int)l1->first_step);
     for (size_t k = 0; k < sizeof ranges / sizeof ranges[0]; ++k)

@@ -1,35 +1,12 @@
 #include "write/model_file.h"
 
 #include "base/file.h"
+#include "write/text.h"
 
 #include <errno.h>
-#include <locale.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* ---- numbers ------------------------------------------------------------------------------ */
-
-/* This thread's numbers get a decimal point until leave_c_locale(). */
-typedef struct ov_locale {
-    locale_t c, before;
-} ov_locale;
-
-static ovoid_status enter_c_locale(ovoid_context *context, ov_locale *locale) {
-    locale->c = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0);
-    if (!locale->c)
-        return ov_fail(context, OVOID_ERROR_MEMORY, "out of memory for a locale");
-    locale->before = uselocale(locale->c);
-    return OVOID_OK;
-}
-
-static void leave_c_locale(ov_locale *locale) {
-    if (!locale->c)
-        return;
-    uselocale(locale->before);
-    freelocale(locale->c);
-    locale->c = (locale_t)0;
-}
 
 /* ---- writing ------------------------------------------------------------------------------ */
 
@@ -57,7 +34,7 @@ ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model,
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
-    OV_TRY(enter_c_locale(context, &locale));
+    OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
     write_header(model, output.stream);
     for (size_t i = 0; i < model->count && !ferror(output.stream); i++)
@@ -65,7 +42,7 @@ ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model,
     status = ov_output_commit(context, &output); /* reports a failed write too */
 
 cleanup:
-    leave_c_locale(&locale);
+    ov_locale_leave(&locale);
     return status;
 }
 
@@ -252,7 +229,7 @@ ovoid_status ovoid_model_read(ovoid_context *context, const char *path, ovoid_mo
     r->stream = standard_input ? stdin : fopen(path, "r");
     if (!r->stream)
         OV_TRY(ov_fail(context, OVOID_ERROR_IO, "cannot read '%s': %s", path, strerror(errno)));
-    OV_TRY(enter_c_locale(context, &locale));
+    OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(read_lines(r));
     r->model->decay = isnan(r->decay) ? OVOID_DEFAULT_DECAY : r->decay;
     r->model->isovalue = isnan(r->isovalue) ? OVOID_DEFAULT_ISOVALUE : r->isovalue;
@@ -263,7 +240,7 @@ ovoid_status ovoid_model_read(ovoid_context *context, const char *path, ovoid_mo
     r->model = NULL;
 
 cleanup:
-    leave_c_locale(&locale);
+    ov_locale_leave(&locale);
     if (r->stream && !standard_input)
         fclose(r->stream);
     ovoid_model_destroy(&r->model);

@@ -278,6 +278,13 @@ typedef struct ovoid_progress {
 /* Returns true to go on, false to stop with OVOID_ERROR_CANCELLED. */
 typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
 
+/* What each atom's Gaussian may become. */
+typedef enum ovoid_kernel {
+    OVOID_KERNEL_ELLIPSOID = 0, /* the paper's model: all ten parameters move, E_l1 is eq. 3.3 */
+    OVOID_KERNEL_SPHERE /* the "sparse RBF" model that Table 1 compares with: spheres of decay d
+                           at the atoms, only amplitudes move, E_l1 is sum_i |c_i| */
+} ovoid_kernel;
+
 /* The step that the line search tries first (open in the paper, which asks for an inexact search
  * along the negative gradient). */
 typedef enum ovoid_first_step {
@@ -288,6 +295,7 @@ typedef enum ovoid_first_step {
 
 /* Constants of the paper's Algorithm 1. Those marked "open" are not given in the paper. */
 typedef struct ovoid_l1_options {
+    ovoid_kernel kernel;         /* ELLIPSOID */
     uint32_t iterations;         /* MaxNiter: 8000 (section 4.1, ADP) */
     uint32_t sparse_iterations;  /* SparseNiter: 6000 (section 4.1, ADP) */
     double epsilon;              /* lower bound of w_s in step 5.4 (open) */

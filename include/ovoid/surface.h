@@ -78,9 +78,10 @@ OVOID_API const ovoid_component *ovoid_mesh_component(const ovoid_mesh *mesh, si
 OVOID_API double ovoid_mesh_area(const ovoid_mesh *mesh);
 OVOID_API double ovoid_mesh_volume(const ovoid_mesh *mesh);
 
-/* The same of the smooth surface that the vertices and their normals lie on: each triangle is given
- * the quadratic height that its normals ask for (sagitta of edge ij: (p_j - p_i) . (n_j - n_i) /
- * 8), which leaves an error of fourth order in the spacing. For exact vertices. */
+/* The same of the smooth surface that the vertices and their normals lie on: each edge is bent to
+ * the height that its ends' normals ask for (sagitta of edge ij: (p_j - p_i) . (n_j - n_i) / 8),
+ * each triangle to the quadratic patch through its three edges. The error is of fourth order in the
+ * spacing. For exact vertices. */
 OVOID_API double ovoid_mesh_smooth_area(const ovoid_mesh *mesh);
 OVOID_API double ovoid_mesh_smooth_volume(const ovoid_mesh *mesh);
 
@@ -141,6 +142,137 @@ OVOID_API void ovoid_measure_options_init(ovoid_measure_options *options);
 OVOID_API ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecule,
                                      const ovoid_model *model, const ovoid_measure_options *options,
                                      ovoid_measures *measures);
+
+/* ---- export ------------------------------------------------------------------------------- */
+
+/* Files for other programs. Ellipsoids, of models alone: */
+typedef enum ovoid_export_format {
+    OVOID_EXPORT_AUTO = 0, /* by the extension */
+    OVOID_EXPORT_BILD,     /* .bild, .bld: ChimeraX, one object of coarse ellipsoids */
+    OVOID_EXPORT_CXC,      /* .cxc: ChimeraX commands, each ellipsoid a smooth surface of its own */
+    OVOID_EXPORT_PYMOL,    /* .py: a script that loads the ellipsoids into PyMOL */
+    OVOID_EXPORT_GMM,      /* .gmm: the Gaussian mixture text of gmconvert and gmfit */
+    OVOID_EXPORT_JSON,     /* .json */
+    /* and the field on a lattice, of models and molecules: */
+    OVOID_EXPORT_CCP4, /* .mrc, .map, .ccp4: MRC2014, 32-bit floats */
+    OVOID_EXPORT_DX    /* .dx: OpenDX text as APBS writes it */
+} ovoid_export_format;
+
+/* Points of a map done so far, of how many. Returns true to go on, false to stop with
+ * OVOID_ERROR_CANCELLED. */
+typedef bool (*ovoid_export_progress_fn)(uint64_t points, uint64_t total, void *user);
+
+typedef struct ovoid_export_options {
+    ovoid_export_format format;
+    /* c. An ellipsoid is drawn where its own Gaussian is c: with semi-axes sqrt(ln(a / c) / d_p).
+     * One that nowhere reaches c (a <= c) is drawn where it has half its amplitude, with semi-axes
+     * sqrt(ln 2 / d_p). A map reaches to where each Gaussian has fallen to c / 100. 0: the model's,
+     * or OVOID_DEFAULT_ISOVALUE of a molecule. */
+    double isovalue;
+    double spacing;                    /* of a map, angstrom; its points are multiples of it */
+    double colour[3];                  /* red, green, blue from 0 to 1, of drawn ellipsoids */
+    double opacity;                    /* from 0 to 1, of drawn ellipsoids */
+    ovoid_export_progress_fn progress; /* may be NULL; maps alone ask it */
+    void *user;
+} ovoid_export_options;
+
+/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue. */
+OVOID_API void ovoid_export_options_init(ovoid_export_options *options);
+
+/* Writes a file for another program, whole or not at all; "-" is standard output and needs a
+ * format. options may be NULL. A map is computed on the device and written piece by piece: memory
+ * does not grow with it. */
+OVOID_API ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model,
+                                          const char *path, const ovoid_export_options *options);
+
+/* As ovoid_model_export(), for the field of a molecule: maps alone. */
+OVOID_API ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
+                                             double decay, const char *path,
+                                             const ovoid_export_options *options);
+
+/* Name of a format as ovoid_export_format_find() takes it, "bild" for example; NULL for others. */
+OVOID_API const char *ovoid_export_format_name(ovoid_export_format format);
+
+/* The format of a name ("ccp4") or an extension ("mrc", with its dot or without), in any case of
+ * letters; AUTO when there is none. */
+OVOID_API ovoid_export_format ovoid_export_format_find(const char *name);
+
+/* ---- pictures ----------------------------------------------------------------------------- */
+
+/* What a picture shows. */
+typedef enum ovoid_view {
+    OVOID_VIEW_ORIGINAL = 0, /* the molecule's surface */
+    OVOID_VIEW_MODEL,        /* the model's surface */
+    OVOID_VIEW_OVERLAY,      /* the model's surface under the molecule's as tinted glass */
+    OVOID_VIEW_DIFFERENCE,   /* the molecule's surface, coloured by how far outside it the model's
+                                lies, (phi~ - phi) / |grad phi|, with a colour bar in angstrom */
+    OVOID_VIEW_ELLIPSOIDS,   /* each ellipsoid by itself, where its own Gaussian is c; one whose
+                                amplitude is at most c shows its centre alone */
+    OVOID_VIEW_PANEL         /* original, model with centres, and overlay side by side */
+} ovoid_view;
+
+#define OVOID_PICTURE_SIDE_MAX 16384 /* pixels */
+#define OVOID_PICTURE_SAMPLES_MAX 8  /* rays across a pixel */
+
+/* A colour as 0xRRGGBBAA (sRGB). */
+typedef struct ovoid_picture_options {
+    ovoid_view view;
+    uint32_t width, height; /* pixels, 1 .. OVOID_PICTURE_SIDE_MAX; of the whole panel */
+    uint32_t samples;       /* rays across a pixel, 1 .. OVOID_PICTURE_SAMPLES_MAX: a pixel is the
+                               mean of samples^2 rays */
+    double isovalue;        /* c */
+    double direction[3];    /* from the molecule to the eye; 0, 0, 0: along the least principal axis
+                               of the atoms' centres. The longest one lies across the longer side. */
+    double rotation[3]; /* about the screen's x (right), y (up), z (to the eye), radian: turns the
+                           molecule after that, in this order */
+    double centre[3];   /* angstrom, in the middle of the picture; NAN: chosen to fit */
+    double across;      /* angstrom across the width of a picture; 0: chosen to fit */
+    uint32_t original;  /* colours of the surfaces; opacity is not used */
+    uint32_t model;
+    uint32_t points;     /* of the centres */
+    uint32_t background; /* opacity 00 makes it transparent */
+    bool centres;        /* show the ellipsoids' centres in views of the model */
+    bool colour_bar;     /* of the difference */
+    double range;        /* of the difference's colours, angstrom to either side; 0: fits 99 % of
+                            what is seen */
+} ovoid_picture_options;
+
+/* OVOID_VIEW_ORIGINAL, 1200 by 900 pixels of 3^2 rays, isovalue 1, default direction, fit to size,
+ * a white background, centres and colour bar shown. */
+OVOID_API void ovoid_picture_options_init(ovoid_picture_options *options);
+
+typedef struct ovoid_image ovoid_image;
+
+/* Takes a picture on the device: orthographic, shaded, with ambient occlusion and depth fading. The
+ * view decides which of molecule and model are needed; the other may be NULL. decay is that of the
+ * molecule's surface. The same input, options, device and driver give the same bytes.
+ *
+ * A surface that is out of sight or does not exist (the isovalue is above the field's maximum) is
+ * no error: the picture shows the background, and ovoid_image_covered() is 0. */
+OVOID_API ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule,
+                                    double decay, const ovoid_model *model,
+                                    const ovoid_picture_options *options, ovoid_image **image);
+
+/* Makes an image of pixels (copied): 4 * width * height bytes as ovoid_image_pixels(). */
+OVOID_API ovoid_status ovoid_image_create(ovoid_context *context, uint32_t width, uint32_t height,
+                                          const uint8_t *pixels, ovoid_image **image);
+OVOID_API void ovoid_image_destroy(ovoid_image **image);
+
+OVOID_API uint32_t ovoid_image_width(const ovoid_image *image);
+OVOID_API uint32_t ovoid_image_height(const ovoid_image *image);
+
+/* Red, green, blue, opacity of each pixel (sRGB, not premultiplied), rows from the top. */
+OVOID_API const uint8_t *ovoid_image_pixels(const ovoid_image *image);
+
+/* Pixels in which ovoid_render() saw a surface; 0 for other images. */
+OVOID_API uint64_t ovoid_image_covered(const ovoid_image *image);
+
+/* The range of colours of OVOID_VIEW_DIFFERENCE, angstrom to either side; 0 for other views. */
+OVOID_API double ovoid_image_range(const ovoid_image *image);
+
+/* Writes a PNG file, whole or not at all. "-" is standard output. */
+OVOID_API ovoid_status ovoid_image_write(ovoid_context *context, const ovoid_image *image,
+                                         const char *path);
 
 #ifdef __cplusplus
 }

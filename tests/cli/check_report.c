@@ -71,10 +71,23 @@ static const char *const numbers[] = {"atoms",
                                       "options.shrink",
                                       "options.grow",
                                       "options.max_backtracks",
+                                      "area.original",
+                                      "area.sparse",
+                                      "area.error",
+                                      "volume.original",
+                                      "volume.sparse",
+                                      "volume.error",
+                                      "hausdorff",
+                                      "mean_distance",
+                                      "hausdorff_outer",
+                                      "components.original",
+                                      "components.sparse",
+                                      "mesh_spacing",
                                       "seconds.device",
                                       "seconds.read",
                                       "seconds.sample",
                                       "seconds.fit",
+                                      "seconds.measure",
                                       "seconds.write",
                                       "seconds.total",
                                       "profile.lists_seconds",
@@ -87,8 +100,8 @@ static const char *const numbers[] = {"atoms",
                                       "profile.launches",
                                       "opencl.compute_units"};
 static const char *const texts[] = {
-    "version", "input",           "output",        "options.first_step", "method",
-    "device",  "opencl.platform", "opencl.vendor", "opencl.driver",      "opencl.version"};
+    "version", "input",           "output",        "options.kernel", "options.first_step", "method",
+    "device",  "opencl.platform", "opencl.vendor", "opencl.driver",  "opencl.version"};
 
 static void check_keys(const cJSON *report) {
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
@@ -106,7 +119,7 @@ static void check_keys(const cJSON *report) {
     double total = number(report, "seconds.total");
     double parts = number(report, "seconds.device") + number(report, "seconds.read") +
                    number(report, "seconds.sample") + number(report, "seconds.fit") +
-                   number(report, "seconds.write");
+                   number(report, "seconds.measure") + number(report, "seconds.write");
     expect(parts <= total + 1e-5, "the sum of seconds", parts, total);
     expect(number(report, "profile.field_passes") >= number(report, "iterations"), "field_passes",
            number(report, "profile.field_passes"), number(report, "iterations"));

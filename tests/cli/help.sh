@@ -3,7 +3,7 @@ for command in "--help" "-h" "help"; do
     run "$OVOID" $command
     expect_code 0
     expect_silent
-    for text in "Usage: ovoid COMMAND" "fit " "devices " "Exit codes:" "OVOID_DEVICE" "Examples:"; do
+    for text in "Usage: ovoid COMMAND" "fit " "mesh " "measure " "devices " "Exit codes:" "OVOID_DEVICE" "Examples:"; do
         expect_out "$text"
     done
 done
@@ -17,7 +17,32 @@ for command in "fit --help" "fit -h" "help fit" "fit molecule.pqr --decay 1 --he
     done
     for option in output report trace format device method quiet help decay isovalue spacing padding \
         iterations sparse-iterations epsilon max-error prune-below prune-every armijo shrink grow \
-        max-backtracks; do
+        max-backtracks kernel mesh-spacing no-measure; do
+        expect_out "--$option"
+    done
+done
+
+for command in "mesh --help" "mesh -h" "help mesh"; do
+    run "$OVOID" $command
+    expect_code 0
+    expect_silent
+    for text in "Usage: ovoid mesh INPUT" "Exit codes:" "Examples:" "OVOID_DEVICE" "(default 0.5 Å)" \
+        .ply .obj .stl .off .glb; do
+        expect_out "$text"
+    done
+    for option in output format device quiet help spacing isovalue decay vertices; do
+        expect_out "--$option"
+    done
+done
+
+for command in "measure --help" "measure -h" "help measure"; do
+    run "$OVOID" $command
+    expect_code 0
+    expect_silent
+    for text in "Usage: ovoid measure MOLECULE MODEL" "Exit codes:" "Examples:" "OVOID_DEVICE"; do
+        expect_out "$text"
+    done
+    for option in report format device quiet help spacing isovalue vertices; do
         expect_out "--$option"
     done
 done

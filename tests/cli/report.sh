@@ -3,19 +3,35 @@ need_device
 make_helix 30 a.xyzr
 echo "9 9 9 0" >>a.xyzr
 run "$OVOID" fit a.xyzr --iterations 60 --decay 0.45 --isovalue 1.1 --spacing 0.9 --padding 2.5 \
-    --prune-every 7 --report r.json --trace t.csv
+    --prune-every 7 --mesh-spacing 0.6 --report r.json --trace t.csv
 expect_code 0
 expect_silent
 expect_out "molecule  a.xyzr: 31 atoms, 1 of them of radius 0"
 expect_out "surface   decay 0.45 Å⁻², isovalue 1.1"
 expect_out "spacing 0.9 Å, padding 2.5 Å"
+expect_out "mesh      spacing 0.6 Å"
 expect_out "report    written to r.json"
 expect_out "trace     written to t.csv"
 expect_files a.xyzr a.ovoid r.json t.csv
 run "$CHECK_REPORT" r.json a.ovoid t.csv atoms=31 zero_radius_atoms=1 atoms_skipped=0 decay=0.45 \
     isovalue=1.1 spacing=0.9 padding=2.5 options.prune_every=7 options.iterations=60 \
-    options.sparse_iterations=45 options.max_error=0.5
+    options.sparse_iterations=45 options.max_error=0.5 mesh_spacing=0.6
 expect_code 0
+
+# Spheres stay where their atoms are and as wide; their number and amplitudes are what changes.
+run "$OVOID" fit a.xyzr --iterations 60 --decay 0.45 --kernel sphere -o s.ovoid --report s.json \
+    --trace s.csv
+expect_code 0
+expect_out "iterations of method l1, spheres at the atoms"
+grep -q '"kernel":[[:space:]]*"sphere"' s.json || fail "the report should name the kernel"
+grep -q '^# settings:.* kernel sphere' s.ovoid || fail "the model should name the kernel"
+run "$CHECK_REPORT" s.json s.ovoid s.csv atoms=31 decay=0.45
+expect_code 0
+awk '/^#|^amplitude/ { next }
+    function off(a, b) { return a - b > 1e-6 || b - a > 1e-6 }
+    off($2, 0.45) || off($3, 0.45) || off($4, 0.45) || $8 || $9 || $10 { bad = 1 }
+    END { exit bad || NR < 20 }' s.ovoid || fail "the model should hold spheres of the atoms' decay"
+rm -f s.ovoid s.json s.csv
 
 # On standard output, for a pipe.
 "$OVOID" fit a.xyzr --iterations 3 -q --report - >r.json 2>"$err"

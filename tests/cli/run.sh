@@ -1,8 +1,9 @@
-# Runs one case: sh run.sh CASE.sh OVOID CHECK_REPORT. The case runs in an empty folder of its own.
+# Runs one case: sh run.sh CASE.sh OVOID CHECK_REPORT CHECK_MEASURES. The case runs in an empty folder of its own.
 # Exit code 77 means skipped. Cases use the functions below; the first failed expectation ends them.
 case_file=$1
 OVOID=$2
 CHECK_REPORT=$3
+CHECK_MEASURES=$4
 here=$(cd "$(dirname "$0")" && pwd)
 place=$(mktemp -d "${TMPDIR:-/tmp}/ovoid-cli-XXXXXX") || exit 1
 out=$place/out

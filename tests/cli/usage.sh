@@ -50,6 +50,7 @@ wrong "--iterations is 0, but must be at least 1" fit a.xyzr --iterations 0
 wrong "--sparse-iterations is 20, but there are only 10" fit a.xyzr --iterations 10 \
     --sparse-iterations 20
 wrong "--method takes l1, not 'best'" fit a.xyzr --method best
+wrong "--kernel takes ellipsoid or sphere, not 'cube'" fit a.xyzr --kernel cube
 wrong "--first-step takes secant or grow, not 'best'" fit a.xyzr --first-step best
 wrong "--format takes pqr or xyzr, not 'pdb'" fit a.xyzr --format pdb
 

@@ -1,0 +1,58 @@
+/*
+ * What a fit, `ovoid measure` and `ovoid mesh` share: inputs, options about surfaces, and measures
+ * as text and as JSON.
+ */
+#ifndef CLI_MEASURES_H
+#define CLI_MEASURES_H
+
+#include "cli.h"
+
+#include "ovoid/surface.h"
+
+/* ---- inputs (source.c) ---------------------------------------------------------------------- */
+
+/* The format of a file that holds a molecule or a model, as --format names it. */
+typedef enum source_format { SOURCE_AUTO = 0, SOURCE_PQR, SOURCE_XYZR, SOURCE_MODEL } source_format;
+
+/* Values of --format; report a usage error for others. */
+bool source_parse_format(const char *text, source_format *format);
+bool source_parse_molecule(const char *text, ovoid_molecule_format *format);
+
+/* One of the two. */
+typedef struct source {
+    ovoid_molecule *molecule;
+    ovoid_model *model;
+} source;
+
+/* Reads a molecule or a model; SOURCE_AUTO as cli_is_model() has it. The source starts as {0}. */
+ovoid_status source_read(ovoid_context *context, const char *path, source_format format,
+                         source *read);
+void source_destroy(source *read);
+
+/* The name of `input` without folder, .gz and extension, with another extension; to be freed. NULL
+ * without memory. */
+char *source_output(const char *input, const char *extension);
+
+/* "standard input" for "-". */
+const char *source_name(const char *path);
+
+/* ---- options (measures.c) ------------------------------------------------------------------- */
+
+bool measures_parse_vertices(const char *text, ovoid_vertex_rule *vertices);
+const char *measures_vertices_name(ovoid_vertex_rule vertices);
+
+/* ---- results (measures.c) ------------------------------------------------------------------- */
+
+/* Lines of a summary, after their names. */
+void measures_print(FILE *stream, const ovoid_measures *measures,
+                    const ovoid_measure_options *options);
+
+/* A table of several, with a heading. */
+void measures_print_heading(FILE *stream);
+void measures_print_row(FILE *stream, double isovalue, const ovoid_measures *measures);
+
+/* Adds what was measured to a report. False: out of memory. */
+bool measures_report(cJSON *object, const ovoid_measures *measures,
+                     const ovoid_measure_options *options);
+
+#endif

@@ -1,0 +1,25 @@
+/*
+ * Marching cubes on the device: from the terms of a field to a mesh.
+ */
+#ifndef OV_MARCH_H
+#define OV_MARCH_H
+
+#include "ovoid/surface.h"
+#include "surface/pieces.h"
+
+/* Lattice points of a piece, per axis, at most: a million, 16 MB on the device. Multiples of the
+ * bricks' sides. The kernels' names of edges hold no more. */
+#define OV_MARCH_PIECE                                                                             \
+    { 128, 128, 64 }
+
+/* Terms count where they are at least this share of the isovalue. */
+#define OV_MARCH_CUTOFF 1e-7
+
+/* The mesh of phi = isovalue. Vertices are numbered piece by piece from the highest piece down, in
+ * a piece along a space-filling curve of its bricks. options are valid; limit as OV_MARCH_PIECE, or
+ * less in tests. OVOID_ERROR_EMPTY when no lattice point is inside. */
+ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
+                      const ovoid_mesh_options *options, const uint64_t limit[3],
+                      ovoid_mesh **mesh);
+
+#endif

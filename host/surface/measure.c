@@ -1,0 +1,95 @@
+#include "surface/measure.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void ovoid_measure_options_init(ovoid_measure_options *options) {
+    *options = (ovoid_measure_options){.isovalue = OVOID_DEFAULT_ISOVALUE,
+                                       .spacing = OVOID_DEFAULT_MESH_SPACING,
+                                       .vertices = OVOID_VERTEX_EXACT,
+                                       .distances = true};
+}
+
+static ovoid_pair pair_of(double original, double sparse) {
+    const double difference = fabs(sparse - original);
+    return (ovoid_pair){original, sparse, difference > 0.0 ? difference / fabs(original) : 0.0};
+}
+
+static uint64_t count_outer(const ovoid_mesh *mesh) {
+    uint64_t count = 0;
+    for (size_t c = 0; c < mesh->components; ++c)
+        count += mesh->component[c].outer;
+    return count;
+}
+
+static ov_content content_of(const ovoid_mesh *mesh, bool smooth, bool outer_only) {
+    return smooth ? ov_mesh_smooth(mesh, outer_only) : ov_mesh_flat(mesh, outer_only);
+}
+
+static void compare_contents(const ovoid_mesh *original, const ovoid_mesh *sparse, bool smooth,
+                             bool outer_only, ovoid_pair *area, ovoid_pair *volume) {
+    const ov_content first = content_of(original, smooth, outer_only);
+    const ov_content second = content_of(sparse, smooth, outer_only);
+    *area = pair_of(first.area, second.area);
+    *volume = pair_of(first.volume, second.volume);
+}
+
+ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *original,
+                               const ovoid_mesh *sparse, bool smooth, bool distances,
+                               ovoid_measures *measures) {
+    ovoid_status status = OVOID_OK;
+    const double begin = ov_seconds();
+    ovoid_measures made = {.components_original = original->components,
+                           .components_sparse = sparse->components,
+                           .outer_original = count_outer(original),
+                           .outer_sparse = count_outer(sparse)};
+    compare_contents(original, sparse, smooth, false, &made.area, &made.volume);
+    compare_contents(original, sparse, smooth, true, &made.area_outer, &made.volume_outer);
+    if (distances) {
+        OV_TRY(ovoid_mesh_distances(context, original, sparse, false, &made.distances, NULL));
+        made.distances_outer = made.distances;
+        if (made.outer_original < original->components || made.outer_sparse < sparse->components)
+            OV_TRY(
+                ovoid_mesh_distances(context, original, sparse, true, &made.distances_outer, NULL));
+    }
+    made.seconds_distances = ov_seconds() - begin;
+    *measures = made;
+cleanup:
+    return status;
+}
+
+/* Says which of the two surfaces failed. */
+static ovoid_status name_failure(ovoid_context *context, ovoid_status status, const char *which) {
+    char *const text = status == OVOID_OK ? NULL : strdup(ovoid_context_error(context));
+    if (text)
+        ov_fail(context, status, "the surface of the %s: %s", which, text);
+    free(text);
+    return status;
+}
+
+ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecule,
+                           const ovoid_model *model, const ovoid_measure_options *options,
+                           ovoid_measures *measures) {
+    ovoid_status status = OVOID_OK;
+    ovoid_mesh *original = NULL, *sparse = NULL;
+    ovoid_measures made;
+    if (!molecule || !model || !options || !measures)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "measuring takes a molecule, a model and options");
+    const double begin = ov_seconds();
+    const ovoid_mesh_options meshing = {options->isovalue, options->spacing, options->vertices};
+    status = ovoid_molecule_mesh(context, molecule, ovoid_model_decay(model), &meshing, &original);
+    OV_TRY(name_failure(context, status, "molecule"));
+    status = ovoid_model_mesh(context, model, &meshing, &sparse);
+    OV_TRY(name_failure(context, status, "model"));
+    const double meshed = ov_seconds();
+    OV_TRY(ov_measure_meshes(context, original, sparse, options->vertices == OVOID_VERTEX_EXACT,
+                             options->distances, &made));
+    made.seconds_mesh = meshed - begin;
+    *measures = made;
+cleanup:
+    ovoid_mesh_destroy(&original);
+    ovoid_mesh_destroy(&sparse);
+    return status;
+}

@@ -1,0 +1,438 @@
+#include "surface/mesh.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- vectors ------------------------------------------------------------------------------ */
+
+static void subtract(const double *a, const double *b, double *result) {
+    for (int k = 0; k < 3; ++k)
+        result[k] = a[k] - b[k];
+}
+
+static double dot(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(const double *a, const double *b, double *result) {
+    result[0] = a[1] * b[2] - a[2] * b[1];
+    result[1] = a[2] * b[0] - a[0] * b[2];
+    result[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* ---- components --------------------------------------------------------------------------- */
+
+static uint32_t find_root(uint32_t *parent, uint32_t vertex) {
+    while (parent[vertex] != vertex) {
+        parent[vertex] = parent[parent[vertex]];
+        vertex = parent[vertex];
+    }
+    return vertex;
+}
+
+/* The smaller index becomes the root, so that a root is its component's first vertex. */
+static void unite(uint32_t *parent, uint32_t a, uint32_t b) {
+    a = find_root(parent, a);
+    b = find_root(parent, b);
+    if (a < b)
+        parent[b] = a;
+    else
+        parent[a] = b;
+}
+
+/* Fills component_of, components and the counts of component. */
+static ovoid_status find_components(ovoid_context *context, ovoid_mesh *mesh) {
+    uint32_t *const of = mesh->component_of;
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        of[v] = (uint32_t)v;
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        const uint32_t *const corner = mesh->corners + 3 * t;
+        unite(of, corner[0], corner[1]);
+        unite(of, corner[0], corner[2]);
+    }
+    size_t count = 0;
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        count += of[v] == v;
+    mesh->components = count;
+    mesh->component = ov_alloc(context, count, sizeof *mesh->component, "components of a mesh");
+    if (!mesh->component)
+        return OVOID_ERROR_MEMORY;
+    /* Parents come before their children: when v is met, of[parent] is a component already. */
+    uint32_t next = 0;
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        of[v] = of[v] == v ? next++ : of[of[v]];
+        ++mesh->component[of[v]].vertices;
+    }
+    for (size_t t = 0; t < mesh->triangles; ++t)
+        ++mesh->component[of[mesh->corners[3 * t]]].triangles;
+    return OVOID_OK;
+}
+
+/* A half-edge, filed under its vertex of lower index: twice the other one, + 1 if it runs towards
+ * the lower one. */
+typedef uint64_t half_edge;
+
+static void sort_half_edges(half_edge *edges, size_t count) {
+    for (size_t k = 1; k < count; ++k) {
+        const half_edge value = edges[k];
+        size_t hole = k;
+        for (; hole > 0 && edges[hole - 1] > value; --hole)
+            edges[hole] = edges[hole - 1];
+        edges[hole] = value;
+    }
+}
+
+static int compare_half_edges(const void *a, const void *b) {
+    const half_edge x = *(const half_edge *)a, y = *(const half_edge *)b;
+    return (x > y) - (x < y);
+}
+
+/* Counts the edges under one vertex; whether each has two half-edges, one each way. */
+static size_t count_edges(half_edge *edges, size_t count, bool *closed) {
+    if (count <= 64)
+        sort_half_edges(edges, count);
+    else
+        qsort(edges, count, sizeof *edges, compare_half_edges);
+    size_t found = 0;
+    for (size_t k = 0; k < count;) {
+        size_t end = k + 1;
+        while (end < count && edges[end] >> 1 == edges[k] >> 1)
+            ++end;
+        if (end - k != 2 || edges[k] == edges[k + 1])
+            *closed = false;
+        ++found;
+        k = end;
+    }
+    return found;
+}
+
+/* Euler characteristics, and whether components are closed and oriented. Half-edges are sorted by
+ * counting: linear. */
+static ovoid_status check_edges(ovoid_context *context, ovoid_mesh *mesh) {
+    ovoid_status status = OVOID_ERROR_MEMORY;
+    const size_t half_edges = 3 * mesh->triangles;
+    size_t *const start = ov_alloc(context, mesh->vertices + 2, sizeof *start, "edges of a mesh");
+    half_edge *const edges = ov_alloc(context, half_edges, sizeof *edges, "edges of a mesh");
+    if (!start || !edges)
+        goto cleanup;
+    for (size_t pass = 0; pass < 2; ++pass) {
+        for (size_t k = 0; k < half_edges; ++k) {
+            const uint32_t a = mesh->corners[k], b = mesh->corners[k % 3 == 2 ? k - 2 : k + 1];
+            const uint32_t low = a < b ? a : b, high = a < b ? b : a;
+            if (pass == 0)
+                ++start[low + 2];
+            else
+                edges[start[low + 1]++] = (half_edge)high << 1 | (a > b);
+        }
+        for (size_t v = 0; pass == 0 && v < mesh->vertices; ++v)
+            start[v + 2] += start[v + 1];
+    }
+    for (size_t c = 0; c < mesh->components; ++c) {
+        mesh->component[c].closed = mesh->component[c].triangles > 0;
+        mesh->component[c].euler =
+            (int32_t)(mesh->component[c].vertices + mesh->component[c].triangles);
+    }
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        ovoid_component *const component = &mesh->component[mesh->component_of[v]];
+        component->euler -=
+            (int32_t)count_edges(edges + start[v], start[v + 1] - start[v], &component->closed);
+    }
+    status = OVOID_OK;
+cleanup:
+    free(edges);
+    free(start);
+    return status;
+}
+
+/* Flat areas and volumes. Each component has its own origin, one of its vertices, so that little
+ * cancels; where it is closed the origin does not matter. */
+static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh) {
+    const double **const origin =
+        ov_alloc(context, mesh->components, sizeof *origin, "components of a mesh");
+    if (!origin)
+        return OVOID_ERROR_MEMORY;
+    for (size_t v = mesh->vertices; v-- > 0;)
+        origin[mesh->component_of[v]] = mesh->xyz + 3 * v;
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        const uint32_t *const corner = mesh->corners + 3 * t;
+        const uint32_t c = mesh->component_of[corner[0]];
+        double a[3], u[3], v[3], normal[3];
+        subtract(mesh->xyz + 3 * (size_t)corner[0], origin[c], a);
+        subtract(mesh->xyz + 3 * (size_t)corner[1], mesh->xyz + 3 * (size_t)corner[0], u);
+        subtract(mesh->xyz + 3 * (size_t)corner[2], mesh->xyz + 3 * (size_t)corner[0], v);
+        cross(u, v, normal);
+        mesh->component[c].area += 0.5 * sqrt(dot(normal, normal));
+        mesh->component[c].volume += dot(a, normal) / 6.0;
+    }
+    for (size_t c = 0; c < mesh->components; ++c)
+        mesh->component[c].outer = mesh->component[c].volume > 0.0;
+    free(origin);
+    return OVOID_OK;
+}
+
+/* ---- making ------------------------------------------------------------------------------- */
+
+static ovoid_status check_arrays(ovoid_context *context, const ovoid_mesh *mesh) {
+    if (mesh->vertices > UINT32_MAX - 1 || mesh->triangles > UINT32_MAX - 1)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "a mesh holds at most 2^32 - 2 vertices and triangles, not %zu and %zu",
+                       mesh->vertices, mesh->triangles);
+    for (size_t k = 0; k < 3 * mesh->vertices; ++k)
+        if (!isfinite(mesh->xyz[k]) || (mesh->normals && !isfinite(mesh->normals[k])))
+            return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                           "vertex %zu of a mesh has a coordinate or normal that is not finite",
+                           k / 3);
+    for (size_t k = 0; k < 3 * mesh->triangles; ++k)
+        if (mesh->corners[k] >= mesh->vertices)
+            return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                           "triangle %zu of a mesh names vertex %lu, but there are %zu", k / 3,
+                           (unsigned long)mesh->corners[k], mesh->vertices);
+    return OVOID_OK;
+}
+
+/* Sums of the normals of the triangles about each vertex, weighted with their areas. */
+static ovoid_status make_normals(ovoid_context *context, ovoid_mesh *mesh) {
+    double *const sum = ov_alloc(context, 3 * mesh->vertices, sizeof *sum, "normals of a mesh");
+    mesh->normals =
+        ov_alloc(context, 3 * mesh->vertices, sizeof *mesh->normals, "normals of a mesh");
+    if (!sum || !mesh->normals) {
+        free(sum);
+        return OVOID_ERROR_MEMORY;
+    }
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        const uint32_t *const corner = mesh->corners + 3 * t;
+        double u[3], v[3], normal[3];
+        subtract(mesh->xyz + 3 * (size_t)corner[1], mesh->xyz + 3 * (size_t)corner[0], u);
+        subtract(mesh->xyz + 3 * (size_t)corner[2], mesh->xyz + 3 * (size_t)corner[0], v);
+        cross(u, v, normal);
+        for (size_t k = 0; k < 9; ++k)
+            sum[3 * (size_t)corner[k / 3] + k % 3] += normal[k % 3];
+    }
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        const double length = sqrt(dot(sum + 3 * v, sum + 3 * v));
+        const double up[3] = {0.0, 0.0, 1.0}; /* where no triangle gives a direction */
+        for (size_t k = 0; k < 3; ++k)
+            mesh->normals[3 * v + k] = (float)(length > 0.0 ? sum[3 * v + k] / length : up[k]);
+    }
+    free(sum);
+    return OVOID_OK;
+}
+
+ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
+                           uint32_t *corners, size_t triangles, ovoid_mesh **mesh) {
+    ovoid_status status = OVOID_OK;
+    ovoid_mesh *made = ov_alloc(context, 1, sizeof *made, "a mesh");
+    if (!made) {
+        free(xyz);
+        free(normals);
+        free(corners);
+        return OVOID_ERROR_MEMORY;
+    }
+    *made = (ovoid_mesh){.vertices = vertices,
+                         .triangles = triangles,
+                         .xyz = xyz,
+                         .normals = normals,
+                         .corners = corners};
+    OV_TRY(check_arrays(context, made));
+    if (!normals)
+        OV_TRY(make_normals(context, made));
+    made->component_of =
+        ov_alloc(context, vertices, sizeof *made->component_of, "components of a mesh");
+    if (!made->component_of) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    OV_TRY(find_components(context, made));
+    OV_TRY(check_edges(context, made));
+    OV_TRY(measure_components(context, made));
+    *mesh = made;
+    made = NULL;
+cleanup:
+    ovoid_mesh_destroy(&made);
+    return status;
+}
+
+static void *copy_of(ovoid_context *context, const void *data, size_t count, size_t size) {
+    void *const copy = ov_alloc(context, count, size, "a mesh");
+    if (copy && count > 0)
+        memcpy(copy, data, count * size);
+    return copy;
+}
+
+ovoid_status ovoid_mesh_create(ovoid_context *context, const double *xyz, const float *normals,
+                               size_t vertices, const uint32_t *corners, size_t triangles,
+                               ovoid_mesh **mesh) {
+    if (!mesh || (!xyz && vertices > 0) || (!corners && triangles > 0))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "a mesh needs its arrays");
+    if (vertices > SIZE_MAX / 3 || triangles > SIZE_MAX / 3)
+        return ov_fail(context, OVOID_ERROR_LIMIT, "a mesh of %zu vertices and %zu triangles",
+                       vertices, triangles);
+    double *const points = copy_of(context, xyz, 3 * vertices, sizeof *xyz);
+    uint32_t *const triples = copy_of(context, corners, 3 * triangles, sizeof *corners);
+    float *const directions =
+        normals ? copy_of(context, normals, 3 * vertices, sizeof *normals) : NULL;
+    if (!points || !triples || (normals && !directions)) {
+        free(points);
+        free(triples);
+        free(directions);
+        return OVOID_ERROR_MEMORY;
+    }
+    return ov_mesh_adopt(context, points, directions, vertices, triples, triangles, mesh);
+}
+
+void ovoid_mesh_destroy(ovoid_mesh **mesh) {
+    if (!mesh || !*mesh)
+        return;
+    free((*mesh)->xyz);
+    free((*mesh)->normals);
+    free((*mesh)->corners);
+    free((*mesh)->component_of);
+    free((*mesh)->component);
+    free(*mesh);
+    *mesh = NULL;
+}
+
+/* ---- accessors ---------------------------------------------------------------------------- */
+
+size_t ovoid_mesh_vertices(const ovoid_mesh *mesh) {
+    return mesh->vertices;
+}
+
+size_t ovoid_mesh_triangles(const ovoid_mesh *mesh) {
+    return mesh->triangles;
+}
+
+const double *ovoid_mesh_xyz(const ovoid_mesh *mesh) {
+    return mesh->xyz;
+}
+
+const float *ovoid_mesh_normals(const ovoid_mesh *mesh) {
+    return mesh->normals;
+}
+
+const uint32_t *ovoid_mesh_corners(const ovoid_mesh *mesh) {
+    return mesh->corners;
+}
+
+const uint32_t *ovoid_mesh_component_of(const ovoid_mesh *mesh) {
+    return mesh->component_of;
+}
+
+size_t ovoid_mesh_components(const ovoid_mesh *mesh) {
+    return mesh->components;
+}
+
+const ovoid_component *ovoid_mesh_component(const ovoid_mesh *mesh, size_t index) {
+    return index < mesh->components ? &mesh->component[index] : NULL;
+}
+
+/* ---- area and volume ---------------------------------------------------------------------- */
+
+ov_content ov_mesh_flat(const ovoid_mesh *mesh, bool outer_only) {
+    ov_content content = {0.0, 0.0};
+    for (size_t c = 0; c < mesh->components; ++c) {
+        if (outer_only && !mesh->component[c].outer)
+            continue;
+        content.area += mesh->component[c].area;
+        content.volume += mesh->component[c].volume;
+    }
+    return content;
+}
+
+/* A triangle bent to its normals: X(l) = sum_i l_i p_i + 4 sum_ij l_i l_j s_ij m_ij over the
+ * barycentric coordinates l, where s_ij is the height of the middle of edge ij over its chord, m_ij
+ * the mean normal there. A curve over the chord e with height 4 s t (1 - t) has slopes +-4 s / |e|
+ * at its ends; normals are perpendicular to slopes, so that e . (n_j - n_i) = 8 s, in which odd
+ * terms of the curve cancel. As s and m belong to the edge, neighbours meet without a gap: heights
+ * over each flat triangle along its own normal would leave wedges at the edges, whose area is of
+ * the same second order as what bending adds. */
+typedef struct bent_triangle {
+    double p[3][3]; /* corners */
+    double n[3][3]; /* normals there */
+    double b[3][3]; /* 4 s m of the edges 01, 12, 20 */
+} bent_triangle;
+
+static void bend(const ovoid_mesh *mesh, size_t triangle, const double *origin, bent_triangle *t) {
+    for (size_t i = 0; i < 3; ++i) {
+        const size_t v = mesh->corners[3 * triangle + i];
+        for (size_t k = 0; k < 3; ++k) {
+            t->p[i][k] = mesh->xyz[3 * v + k] - origin[k];
+            t->n[i][k] = mesh->normals[3 * v + k];
+        }
+    }
+    for (size_t i = 0; i < 3; ++i) {
+        const size_t j = (i + 1) % 3;
+        double edge[3], turn[3], mean[3];
+        subtract(t->p[j], t->p[i], edge);
+        subtract(t->n[j], t->n[i], turn);
+        for (size_t k = 0; k < 3; ++k)
+            mean[k] = t->n[i][k] + t->n[j][k];
+        const double length = sqrt(dot(mean, mean));
+        const double height = length > 1e-3 ? 0.5 * dot(edge, turn) / length : 0.0;
+        for (size_t k = 0; k < 3; ++k)
+            t->b[i][k] = height * mean[k];
+    }
+}
+
+/* X, and its derivatives' cross product, at barycentric coordinates l. */
+static void bent_at(const bent_triangle *t, const double *l, double *x, double *area) {
+    double u[3], v[3];
+    for (size_t k = 0; k < 3; ++k) {
+        const double b0 = t->b[0][k], b1 = t->b[1][k], b2 = t->b[2][k];
+        x[k] = l[0] * t->p[0][k] + l[1] * t->p[1][k] + l[2] * t->p[2][k] + l[0] * l[1] * b0 +
+               l[1] * l[2] * b1 + l[2] * l[0] * b2;
+        u[k] = t->p[1][k] - t->p[0][k] + (l[0] - l[1]) * b0 + l[2] * (b1 - b2);
+        v[k] = t->p[2][k] - t->p[0][k] + (l[0] - l[2]) * b2 + l[1] * (b1 - b0);
+    }
+    cross(u, v, area);
+}
+
+/* Dunavant's rule of degree 4, which the volume's integrand has. The area's is the vector area
+ * along the interpolated normal: unlike its length it stays true where a needle of a triangle,
+ * whose plane may be anything, folds over. */
+static void integrate_bent(const bent_triangle *t, ov_content *content) {
+    static const double near_edge[2] = {0.445948490915965, 0.091576213509771};
+    static const double weight[2] = {0.223381589678011, 0.109951743655322};
+    for (size_t q = 0; q < 6; ++q) {
+        double l[3], x[3], area[3], normal[3];
+        for (size_t i = 0; i < 3; ++i)
+            l[i] = near_edge[q / 3];
+        l[q % 3] = 1.0 - 2.0 * near_edge[q / 3];
+        bent_at(t, l, x, area);
+        for (size_t k = 0; k < 3; ++k)
+            normal[k] = l[0] * t->n[0][k] + l[1] * t->n[1][k] + l[2] * t->n[2][k];
+        const double length = sqrt(dot(normal, normal));
+        if (length > 1e-3)
+            content->area += 0.5 * weight[q / 3] * dot(area, normal) / length;
+        content->volume += weight[q / 3] * dot(x, area) / 6.0;
+    }
+}
+
+ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only) {
+    ov_content content = {0.0, 0.0};
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        if (outer_only && !ov_mesh_component_of_triangle(mesh, t)->outer)
+            continue;
+        bent_triangle bent;
+        bend(mesh, t, mesh->xyz, &bent);
+        integrate_bent(&bent, &content);
+    }
+    return content;
+}
+
+double ovoid_mesh_area(const ovoid_mesh *mesh) {
+    return ov_mesh_flat(mesh, false).area;
+}
+
+double ovoid_mesh_volume(const ovoid_mesh *mesh) {
+    return ov_mesh_flat(mesh, false).volume;
+}
+
+double ovoid_mesh_smooth_area(const ovoid_mesh *mesh) {
+    return ov_mesh_smooth(mesh, false).area;
+}
+
+double ovoid_mesh_smooth_volume(const ovoid_mesh *mesh) {
+    return ov_mesh_smooth(mesh, false).volume;
+}

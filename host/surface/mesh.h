@@ -1,0 +1,39 @@
+/*
+ * A triangle mesh on the host: arrays, and what follows from them.
+ */
+#ifndef OV_MESH_H
+#define OV_MESH_H
+
+#include "base/base.h"
+#include "ovoid/surface.h"
+
+struct ovoid_mesh {
+    size_t vertices, triangles;
+    double *xyz;            /* 3 * vertices, angstrom */
+    float *normals;         /* 3 * vertices, outward unit vectors */
+    uint32_t *corners;      /* 3 * triangles */
+    uint32_t *component_of; /* vertices */
+    ovoid_component *component;
+    size_t components;
+};
+
+/* Makes a mesh that takes the arrays over (they are freed on failure too): normals may be NULL.
+ * Finds the components, numbered by their first vertex. OVOID_ERROR_ARGUMENT when a corner names no
+ * vertex or a coordinate is not finite, OVOID_ERROR_LIMIT beyond 2^32 - 1 vertices or triangles. */
+ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
+                           uint32_t *corners, size_t triangles, ovoid_mesh **mesh);
+
+/* Component of a triangle. */
+static inline const ovoid_component *ov_mesh_component_of_triangle(const ovoid_mesh *mesh,
+                                                                   size_t triangle) {
+    return &mesh->component[mesh->component_of[mesh->corners[3 * triangle]]];
+}
+
+/* Area and volume of all components or of the outer ones alone. */
+typedef struct ov_content {
+    double area, volume;
+} ov_content;
+ov_content ov_mesh_flat(const ovoid_mesh *mesh, bool outer_only);
+ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only);
+
+#endif

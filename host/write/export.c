@@ -1,0 +1,212 @@
+#include "write/export.h"
+
+#include "base/file.h"
+#include "field/field.h"
+#include "write/text.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+typedef struct format {
+    const char *name;
+    const char *extensions;
+    void (*ellipsoids)(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+    ovoid_status (*map)(ovoid_context *context, const ov_map *map, FILE *stream);
+} format;
+
+static const format formats[] = {
+    [OVOID_EXPORT_AUTO] = {"", "", NULL, NULL},
+    [OVOID_EXPORT_BILD] = {"bild", ".bild .bld", ov_write_bild, NULL},
+    [OVOID_EXPORT_CXC] = {"cxc", ".cxc", ov_write_cxc, NULL},
+    [OVOID_EXPORT_PYMOL] = {"pymol", ".py", ov_write_pymol, NULL},
+    [OVOID_EXPORT_GMM] = {"gmm", ".gmm", ov_write_gmm, NULL},
+    [OVOID_EXPORT_JSON] = {"json", ".json", ov_write_json, NULL},
+    [OVOID_EXPORT_CCP4] = {"ccp4", ".mrc .map .ccp4", NULL, ov_write_ccp4},
+    [OVOID_EXPORT_DX] = {"dx", ".dx", NULL, ov_write_dx},
+};
+enum { FORMATS = sizeof formats / sizeof *formats };
+
+#define ELLIPSOID_ENDINGS ".bild, .cxc, .py, .gmm, .json"
+#define MAP_ENDINGS ".mrc, .map, .ccp4, .dx"
+
+const char *ovoid_export_format_name(ovoid_export_format which) {
+    return which > OVOID_EXPORT_AUTO && (size_t)which < FORMATS ? formats[which].name : NULL;
+}
+
+ovoid_export_format ovoid_export_format_find(const char *name) {
+    char dotted[16];
+    if (!name || (size_t)snprintf(dotted, sizeof dotted, ".%s", name) >= sizeof dotted)
+        return OVOID_EXPORT_AUTO;
+    for (int i = 1; i < FORMATS; i++)
+        if (strcasecmp(name, formats[i].name) == 0 ||
+            ov_extension_is(name, formats[i].extensions) ||
+            ov_extension_is(dotted, formats[i].extensions))
+            return (ovoid_export_format)i;
+    return OVOID_EXPORT_AUTO;
+}
+
+void ovoid_export_options_init(ovoid_export_options *options) {
+    *options = (ovoid_export_options){
+        .spacing = OVOID_DEFAULT_MESH_SPACING, .colour = {0.30, 0.55, 0.80}, .opacity = 1.0};
+}
+
+static bool is_share(double value) {
+    return value >= 0.0 && value <= 1.0;
+}
+
+static ovoid_status check_options(ovoid_context *context, const ovoid_export_options *o) {
+    if ((size_t)o->format >= FORMATS)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "%d is no format of an export",
+                       (int)o->format);
+    if (!(o->isovalue >= 0.0 && isfinite(o->isovalue)))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue %g is not positive", o->isovalue);
+    if (!(o->spacing > 0.0 && o->spacing <= 1000.0))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "spacing %g is not above 0 and at most 1000 angstrom", o->spacing);
+    if (!is_share(o->colour[0]) || !is_share(o->colour[1]) || !is_share(o->colour[2]) ||
+        !is_share(o->opacity))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "colour (%g, %g, %g) and opacity %g must be from 0 to 1", o->colour[0],
+                       o->colour[1], o->colour[2], o->opacity);
+    return OVOID_OK;
+}
+
+/* The format that the options or the path ask for. */
+static ovoid_status choose_format(ovoid_context *context, const char *path,
+                                  const ovoid_export_options *options, bool model,
+                                  const format **chosen) {
+    ovoid_export_format which = options->format;
+    if (which == OVOID_EXPORT_AUTO)
+        which = ovoid_export_format_find(ov_extension(path));
+    *chosen = &formats[which];
+    if (which == OVOID_EXPORT_AUTO && strcmp(path, "-") == 0)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "standard output does not say what to write: name a format");
+    if (which == OVOID_EXPORT_AUTO)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "'%s' does not say what to write: its name would end in one of "
+                       "%s" MAP_ENDINGS,
+                       path, model ? ELLIPSOID_ENDINGS ", " : "");
+    if (!model && !(*chosen)->map)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "a molecule has no ellipsoids to write as %s: fit a model to it first, or "
+                       "write a map (" MAP_ENDINGS ")",
+                       (*chosen)->name);
+    return OVOID_OK;
+}
+
+/* Writes what the chosen format takes, whole or not at all. */
+static ovoid_status write_file(ovoid_context *context, const char *path, const format *chosen,
+                               const ovoid_model *model, const ov_drawing *drawing,
+                               const ov_map *map) {
+    ovoid_status status = OVOID_OK;
+    ov_output output = {0};
+    ov_locale locale = {0};
+    OV_TRY(ov_locale_enter(context, &locale));
+    OV_TRY(ov_output_open(context, path, &output));
+    if (chosen->map)
+        OV_TRY(chosen->map(context, map, output.stream));
+    else
+        chosen->ellipsoids(model, drawing, output.stream);
+    OV_TRY(ov_stream_check(context, output.stream, path));
+    status = ov_output_commit(context, &output);
+
+cleanup:
+    ov_output_abandon(&output);
+    ov_locale_leave(&locale);
+    return status;
+}
+
+/* The map of these quadrics. */
+static ovoid_status write_map(ovoid_context *context, const char *path, const format *chosen,
+                              const ovoid_export_options *options, double isovalue,
+                              const ov_quadric *quadrics, size_t count, const char *label) {
+    ov_map map = {.quadrics = quadrics,
+                  .count = count,
+                  .spacing = options->spacing,
+                  .progress = options->progress,
+                  .user = options->user};
+    snprintf(map.label, sizeof map.label, "%s", label);
+    ovoid_status status = ov_map_cover(context, &map, isovalue);
+    return status == OVOID_OK ? write_file(context, path, chosen, NULL, NULL, &map) : status;
+}
+
+static ovoid_status export_model_map(ovoid_context *context, const ovoid_model *model,
+                                     const char *path, const format *chosen,
+                                     const ovoid_export_options *options, double isovalue) {
+    const size_t count = ovoid_model_size(model);
+    char label[80];
+    ov_quadric *quadrics = ov_alloc(context, count, sizeof *quadrics, "ellipsoids");
+    if (!quadrics)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        ov_quadric_of_ellipsoid(&ovoid_model_ellipsoids(model)[i], &quadrics[i]);
+    snprintf(label, sizeof label, "field of %zu ellipsoids, isovalue %.6g", count,
+             ovoid_model_isovalue(model));
+    ovoid_status status =
+        write_map(context, path, chosen, options, isovalue, quadrics, count, label);
+    free(quadrics);
+    return status;
+}
+
+ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model, const char *path,
+                                const ovoid_export_options *options) {
+    if (!context || !model || !path)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_export: an argument is NULL");
+    ovoid_export_options o;
+    const format *chosen;
+    ovoid_export_options_init(&o);
+    if (options)
+        o = *options;
+    ovoid_status status = check_options(context, &o);
+    if (status == OVOID_OK)
+        status = choose_format(context, path, &o, true, &chosen);
+    if (status != OVOID_OK)
+        return status;
+    const double isovalue = o.isovalue > 0.0 ? o.isovalue : ovoid_model_isovalue(model);
+    if (chosen->map)
+        return export_model_map(context, model, path, chosen, &o, isovalue);
+    ov_drawing drawing = {.isovalue = isovalue, .opacity = o.opacity};
+    memcpy(drawing.colour, o.colour, sizeof drawing.colour);
+    ov_title(path, drawing.title, sizeof drawing.title);
+    return write_file(context, path, chosen, model, &drawing, NULL);
+}
+
+ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
+                                   double decay, const char *path,
+                                   const ovoid_export_options *options) {
+    if (!context || !molecule || !path)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_export: an argument is NULL");
+    if (!(decay > 0.0 && decay <= 100.0))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
+                       decay);
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    const double *xyzr = ovoid_molecule_xyzr(molecule);
+    ov_quadric *quadrics = NULL;
+    ovoid_status status = OVOID_OK;
+    ovoid_export_options o;
+    const format *chosen;
+    char label[80];
+    ovoid_export_options_init(&o);
+    if (options)
+        o = *options;
+    OV_TRY(check_options(context, &o));
+    OV_TRY(choose_format(context, path, &o, false, &chosen));
+    OV_TRY(ov_atoms_check(context, xyzr, atoms, decay));
+    quadrics = ov_alloc(context, atoms, sizeof *quadrics, "atoms");
+    if (!quadrics)
+        OV_TRY(OVOID_ERROR_MEMORY);
+    for (size_t i = 0; i < atoms; i++)
+        ov_quadric_of_atom(xyzr + 4 * i, decay, &quadrics[i]);
+    snprintf(label, sizeof label, "field of %zu atoms, decay %.6g per square angstrom", atoms,
+             decay);
+    status =
+        write_map(context, path, chosen, &o, o.isovalue > 0.0 ? o.isovalue : OVOID_DEFAULT_ISOVALUE,
+                  quadrics, atoms, label);
+
+cleanup:
+    free(quadrics);
+    return status;
+}

@@ -1,0 +1,78 @@
+/*
+ * Models and fields for other programs: what the formats share, and one writer each.
+ *
+ * Writers of text expect the "C" locale. A failed write shows in the stream's error flag; they stop
+ * at it.
+ */
+#ifndef OV_EXPORT_H
+#define OV_EXPORT_H
+
+#include "base/base.h"
+#include "field/ellipsoid.h"
+#include "ovoid/surface.h"
+
+#include <stdio.h>
+
+/* ---- ellipsoids --------------------------------------------------------------------------- */
+
+/* How ellipsoids are drawn: the options, with nothing left open. */
+typedef struct ov_drawing {
+    double isovalue;
+    double colour[3], opacity;
+    char title[64]; /* letters, digits, '-' and '_' */
+} ov_drawing;
+
+/* One as a solid: x = centre + sum_p t_p semi[p] axis[p] with |t| <= 1. The axes are unit vectors
+ * and right-handed. */
+typedef struct ov_solid {
+    double centre[3];
+    double semi[3];
+    double axis[3][3];
+} ov_solid;
+
+/* The isosurface of one ellipsoid's Gaussian at the isovalue, or, where it nowhere reaches that, at
+ * half its amplitude. */
+void ov_solid_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, double isovalue, ov_solid *solid);
+
+/* The rotation that takes x, y and z to the solid's axes: about this unit vector by this angle
+ * (degrees, 0 to 180). */
+void ov_solid_rotation(const ov_solid *solid, double vector[3], double *angle);
+
+void ov_write_bild(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+void ov_write_cxc(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+void ov_write_pymol(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+void ov_write_gmm(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+void ov_write_json(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+
+/* ---- maps --------------------------------------------------------------------------------- */
+
+/* A field on the lattice of points spacing * (start + i), i = 0 .. size - 1 in each axis. */
+typedef struct ov_map {
+    const ov_quadric *quadrics; /* not owned */
+    size_t count;
+    double spacing;   /* angstrom */
+    int32_t start[3]; /* x, y, z */
+    int32_t size[3];
+    char label[80]; /* what field it is */
+    ovoid_export_progress_fn progress;
+    void *user;
+} ov_map;
+
+/* Sets the lattice: it covers the region where a Gaussian is at least isovalue / 100.
+ * OVOID_ERROR_LIMIT when it has too many points. */
+ovoid_status ov_map_cover(ovoid_context *context, ov_map *map, double isovalue);
+
+uint64_t ov_map_points(const ov_map *map);
+
+/* Takes the next values of a map. */
+typedef void (*ov_map_sink)(const double *values, size_t count, void *user);
+
+/* Computes the field piece by piece, fast[0] the axis that runs fastest, fast[2] slowest, until all
+ * is done, a write to `stream` fails, or the map's progress function says stop. */
+ovoid_status ov_map_run(ovoid_context *context, const ov_map *map, const int fast[3], FILE *stream,
+                        ov_map_sink sink, void *user);
+
+ovoid_status ov_write_ccp4(ovoid_context *context, const ov_map *map, FILE *stream);
+ovoid_status ov_write_dx(ovoid_context *context, const ov_map *map, FILE *stream);
+
+#endif

@@ -1,0 +1,111 @@
+/* glTF 2.0, binary (Khronos Group, "glTF 2.0 Specification", sections 3 and 4): one mesh of one
+ * primitive, its buffer holding positions, normals and indices one after the other, all of them
+ * multiples of four bytes long.
+ *
+ * glTF's unit is the metre. A molecule in metres is lost to every viewer, so one unit here is one
+ * angstrom, as other programs for molecules have it, and asset.extras says so. */
+#include "write/bytes.h"
+#include "write/mesh_file.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+
+enum { HEADER = 12, CHUNK_HEADER = 8, VECTOR = 12, TEXT = 2048 };
+
+typedef struct layout {
+    size_t vertices, triangles;
+    uint64_t vectors; /* bytes of the positions, and of the normals */
+    uint64_t indices; /* bytes */
+    float low[3], high[3];
+} layout;
+
+static void find_layout(const ovoid_mesh *mesh, layout *l) {
+    const double *xyz = ovoid_mesh_xyz(mesh);
+    *l = (layout){.vertices = ovoid_mesh_vertices(mesh), .triangles = ovoid_mesh_triangles(mesh)};
+    l->vectors = (uint64_t)l->vertices * VECTOR;
+    l->indices = (uint64_t)l->triangles * VECTOR;
+    for (size_t axis = 0; axis < 3; axis++) {
+        l->low[axis] = l->high[axis] = (float)xyz[axis];
+        for (size_t i = 1; i < l->vertices; i++) {
+            l->low[axis] = fminf(l->low[axis], (float)xyz[3 * i + axis]);
+            l->high[axis] = fmaxf(l->high[axis], (float)xyz[3 * i + axis]);
+        }
+    }
+}
+
+/* The JSON chunk, filled up with blanks to a multiple of four. Nine digits keep a float. */
+static uint32_t print_json(const layout *l, char *text) {
+    int length = snprintf(
+        text, TEXT,
+        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Ovoid %s\","
+        "\"extras\":{\"unit\":\"angstrom\"}},"
+        "\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
+        "\"nodes\":[{\"mesh\":0,\"name\":\"surface\"}],"
+        "\"meshes\":[{\"name\":\"surface\",\"primitives\":[{\"attributes\":{\"POSITION\":0,"
+        "\"NORMAL\":1},\"indices\":2,\"material\":0,\"mode\":4}]}],"
+        "\"materials\":[{\"name\":\"surface\",\"pbrMetallicRoughness\":{\"baseColorFactor\":"
+        "[0.8,0.8,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.6}}],"
+        "\"buffers\":[{\"byteLength\":%" PRIu64 "}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteOffset\":0,\"byteLength\":%" PRIu64
+        ",\"target\":34962},"
+        "{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 ",\"target\":34962},"
+        "{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 ",\"target\":34963}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":%zu,\"type\":\"VEC3\","
+        "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]},"
+        "{\"bufferView\":1,\"componentType\":5126,\"count\":%zu,\"type\":\"VEC3\"},"
+        "{\"bufferView\":2,\"componentType\":5125,\"count\":%zu,\"type\":\"SCALAR\"}]}",
+        ovoid_version(), 2 * l->vectors + l->indices, l->vectors, l->vectors, l->vectors,
+        2 * l->vectors, l->indices, l->vertices, (double)l->low[0], (double)l->low[1],
+        (double)l->low[2], (double)l->high[0], (double)l->high[1], (double)l->high[2], l->vertices,
+        3 * l->triangles);
+    while (length % 4)
+        text[length++] = ' ';
+    return (uint32_t)length;
+}
+
+/* The specification wants unit normals; a vertex of triangles without area may have none. */
+static void put_normal(ov_bytes *bytes, const float *normal) {
+    double n[3] = {(double)normal[0], (double)normal[1], (double)normal[2]};
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    bool usable = isfinite(length) && length > 0.0;
+    for (int axis = 0; axis < 3; axis++)
+        ov_put_f32(bytes, usable ? (float)(n[axis] / length) : axis == 2 ? 1.0f : 0.0f);
+}
+
+static void put_buffer(ov_bytes *bytes, const ovoid_mesh *mesh, const layout *l) {
+    const double *xyz = ovoid_mesh_xyz(mesh);
+    const float *normals = ovoid_mesh_normals(mesh);
+    const uint32_t *corners = ovoid_mesh_corners(mesh);
+    for (size_t i = 0; i < 3 * l->vertices; i++)
+        ov_put_f32(bytes, (float)xyz[i]);
+    for (size_t i = 0; i < l->vertices; i++)
+        put_normal(bytes, normals + 3 * i);
+    for (size_t i = 0; i < 3 * l->triangles; i++)
+        ov_put_u32(bytes, corners[i]);
+}
+
+ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream) {
+    layout l;
+    char json[TEXT];
+    ov_bytes bytes = {.stream = stream};
+    find_layout(mesh, &l);
+    const uint32_t json_length = print_json(&l, json);
+    const uint64_t buffer = 2 * l.vectors + l.indices;
+    const uint64_t total = HEADER + 2 * CHUNK_HEADER + json_length + buffer;
+    if (total > UINT32_MAX)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "a glTF binary file holds 4 GiB at most, the mesh needs %.1f: write .ply",
+                       (double)total / (1 << 30));
+    ov_put_text(&bytes, "glTF", 4);
+    ov_put_u32(&bytes, 2);
+    ov_put_u32(&bytes, (uint32_t)total);
+    ov_put_u32(&bytes, json_length);
+    ov_put_text(&bytes, "JSON", 4);
+    ov_put_text(&bytes, json, json_length);
+    ov_put_u32(&bytes, (uint32_t)buffer);
+    ov_put_text(&bytes, "BIN\0", 4);
+    put_buffer(&bytes, mesh, &l);
+    ov_bytes_flush(&bytes);
+    return OVOID_OK;
+}

@@ -1,0 +1,93 @@
+/* A model as JSON (RFC 8259), written as it goes: a tree of it would be many times its size. */
+#include "write/export.h"
+
+#include <string.h>
+
+/* Bytes of the UTF-8 character at text, 0 if there is none (RFC 3629, section 4). */
+static size_t utf8_length(const unsigned char *text) {
+    size_t length = text[0] < 0x80 ? 1 : text[0] < 0xc2 ? 0 : text[0] < 0xe0 ? 2 : 3;
+    unsigned char low = 0x80, high = 0xbf; /* of the second byte */
+    if (text[0] >= 0xf0)
+        length = text[0] < 0xf5 ? 4 : 0;
+    if (text[0] == 0xe0)
+        low = 0xa0;
+    if (text[0] == 0xed)
+        high = 0x9f; /* surrogates */
+    if (text[0] == 0xf0)
+        low = 0x90;
+    if (text[0] == 0xf4)
+        high = 0x8f;
+    for (size_t i = 1; i < length; i++, low = 0x80, high = 0xbf)
+        if (text[i] < low || text[i] > high)
+            return 0;
+    return length;
+}
+
+/* Text that is no UTF-8 (a file name may be anything) is made so. */
+static void write_string(const char *string, FILE *stream) {
+    const unsigned char *text = (const unsigned char *)string;
+    putc('"', stream);
+    while (*text) {
+        const size_t length = utf8_length(text);
+        if (length == 0)
+            fputs("\\ufffd", stream);
+        else if (*text < 0x20)
+            fprintf(stream, "\\u%04x", *text);
+        else if (*text == '"' || *text == '\\')
+            fprintf(stream, "\\%c", *text);
+        else
+            fwrite(text, 1, length, stream);
+        text += length ? length : 1;
+    }
+    putc('"', stream);
+}
+
+static void write_vector(const char *key, const double *v, FILE *stream) {
+    fprintf(stream, "\"%s\": [%.9g, %.9g, %.9g]", key, v[0], v[1], v[2]);
+}
+
+static void write_ellipsoid(const ovoid_ellipsoid *e, double isovalue, FILE *stream) {
+    ov_solid s;
+    ov_solid_of_ellipsoid(e, isovalue, &s);
+    fprintf(stream, "    {\"amplitude\": %.9g, ", e->amplitude);
+    write_vector("decay", e->decay, stream);
+    fputs(", ", stream);
+    write_vector("centre", e->centre, stream);
+    fputs(", ", stream);
+    write_vector("angle", e->angle, stream);
+    fputs(",\n     \"axes\": [", stream);
+    for (int p = 0; p < 3; p++)
+        fprintf(stream, "%s[%.9g, %.9g, %.9g]", p ? ", " : "", s.axis[p][0], s.axis[p][1],
+                s.axis[p][2]);
+    fputs("], ", stream);
+    write_vector("semi_axes", s.semi, stream);
+    fprintf(stream, ", \"reaches_isovalue\": %s}", e->amplitude > isovalue ? "true" : "false");
+}
+
+void ov_write_json(const ovoid_model *model, const ov_drawing *drawing, FILE *stream) {
+    const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
+    const char *note;
+    fprintf(stream,
+            "{\n"
+            "  \"format\": \"ovoid model\",\n"
+            "  \"version\": 1,\n"
+            "  \"program\": \"ovoid %s\",\n"
+            "  \"decay\": %.9g,\n"
+            "  \"isovalue\": %.9g,\n"
+            "  \"semi_axes_isovalue\": %.9g,\n"
+            "  \"notes\": [",
+            ovoid_version(), ovoid_model_decay(model), ovoid_model_isovalue(model),
+            drawing->isovalue);
+    for (size_t i = 0; (note = ovoid_model_note(model, i)) != NULL && !ferror(stream); i++) {
+        fputs(i ? ",\n    " : "\n    ", stream);
+        write_string(note, stream);
+    }
+    fputs(ovoid_model_note(model, 0) ? "\n  ],\n" : "],\n", stream);
+    fputs("  \"ellipsoids\": [\n", stream);
+    for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
+        if (i)
+            fputs(",\n", stream);
+        write_ellipsoid(&ellipsoids[i], drawing->isovalue, stream);
+    }
+    fputs("\n  ]\n}\n", stream);
+}

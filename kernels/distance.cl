@@ -1,0 +1,179 @@
+/*
+ * Distances from points to the nearest point of a mesh's triangles.
+ *
+ * The triangles lie along a space-filling curve in leaves of OV_LEAF, under a tree of boxes. A
+ * point walks the tree nearest box first, with vectors over the 16 boxes of a group and over the
+ * triangles of a leaf, and leaves out what is farther than the nearest triangle so far. The least
+ * distance does not depend on the order in which it is found.
+ *
+ * triangles: per leaf OV_TRIANGLE arrays of OV_LEAF floats: corner p (3), edges u and v from it (3
+ * each), the vectors g and h (3 each) with u.g = v.h = 1, u.h = v.g = 0 in the triangle's plane,
+ * and 1/u^2, 1/v^2, 1/(v-u)^2. What a degenerate triangle does not have is zero. The last leaf is
+ * filled up with its last triangle.
+ */
+
+/* On GPUs four boxes or triangles per work-item hide the latencies. */
+#if OV_VECTOR == 1
+#define OV_WIDE 4
+#else
+#define OV_WIDE OV_VECTOR
+#endif
+typedef OV_JOIN(float, OV_WIDE) ov_wide;
+#define OV_WIDE_LOAD OV_JOIN(vload, OV_WIDE)
+#define OV_WIDE_STORE OV_JOIN(vstore, OV_WIDE)
+
+/* The least component. */
+#if OV_WIDE == 16
+#define OV_FOLD(a) min(min((a).lo.lo, (a).lo.hi), min((a).hi.lo, (a).hi.hi))
+#elif OV_WIDE == 8
+#define OV_FOLD(a) min((a).lo, (a).hi)
+#else
+#define OV_FOLD(a) (a)
+#endif
+static inline float ov_least(ov_wide a) {
+    const float4 four = OV_FOLD(a);
+    const float2 two = min(four.lo, four.hi);
+    return min(two.x, two.y);
+}
+
+/* Squared length of w - s u - t v. */
+static inline ov_wide ov_residue(const ov_wide *w, const ov_wide *u, const ov_wide *v, ov_wide s,
+                                 ov_wide t) {
+    const ov_wide x = fma(-t, v[0], fma(-s, u[0], w[0]));
+    const ov_wide y = fma(-t, v[1], fma(-s, u[1], w[1]));
+    const ov_wide z = fma(-t, v[2], fma(-s, u[2], w[2]));
+    return fma(x, x, fma(y, y, z * z));
+}
+
+static inline ov_wide ov_dot(const ov_wide *a, const ov_wide *b) {
+    return fma(a[0], b[0], fma(a[1], b[1], a[2] * b[2]));
+}
+
+/* Least squared distance from the point to a leaf's triangles: of the nearest point of each
+ * triangle's plane, moved into the triangle, and of the nearest points of its three edges. Each of
+ * the four lies in the triangle, and one of them is its nearest point, so that rounding never finds
+ * anything nearer than there is. */
+static inline float ov_leaf_distance(float px, float py, float pz, __global const float *leaf) {
+    float least = INFINITY;
+    for (uint k = 0; k < OV_LEAF / OV_WIDE; ++k) {
+        ov_wide w[3], u[3], v[3], g[3], h[3], across[3];
+        w[0] = px - OV_WIDE_LOAD(k, leaf);
+        w[1] = py - OV_WIDE_LOAD(k, leaf + OV_LEAF);
+        w[2] = pz - OV_WIDE_LOAD(k, leaf + 2 * OV_LEAF);
+#pragma unroll
+        for (uint axis = 0; axis < 3; ++axis) {
+            u[axis] = OV_WIDE_LOAD(k, leaf + (3 + axis) * OV_LEAF);
+            v[axis] = OV_WIDE_LOAD(k, leaf + (6 + axis) * OV_LEAF);
+            g[axis] = OV_WIDE_LOAD(k, leaf + (9 + axis) * OV_LEAF);
+            h[axis] = OV_WIDE_LOAD(k, leaf + (12 + axis) * OV_LEAF);
+            across[axis] = v[axis] - u[axis];
+        }
+        const ov_wide one = 1.0f, zero = 0.0f;
+        const ov_wide along_u = ov_dot(w, u), along_v = ov_dot(w, v), uv = ov_dot(u, across);
+        const ov_wide on_u = clamp(along_u * OV_WIDE_LOAD(k, leaf + 15 * OV_LEAF), zero, one);
+        const ov_wide on_v = clamp(along_v * OV_WIDE_LOAD(k, leaf + 16 * OV_LEAF), zero, one);
+        const ov_wide on_w =
+            clamp((along_v - along_u - uv) * OV_WIDE_LOAD(k, leaf + 17 * OV_LEAF), zero, one);
+        const ov_wide s = clamp(ov_dot(w, g), zero, one);
+        const ov_wide t = clamp(ov_dot(w, h), zero, one - s);
+        const ov_wide edges =
+            min(min(ov_residue(w, u, v, on_u, zero), ov_residue(w, u, v, zero, on_v)),
+                ov_residue(w, u, v, one - on_w, on_w));
+        least = min(least, ov_least(min(edges, ov_residue(w, u, v, s, t))));
+    }
+    return least;
+}
+
+/* Squared distances to the boxes of a group; absent boxes are infinitely far. */
+static inline void ov_box_distances(float px, float py, float pz, __global const float *group,
+                                    float *distance) {
+#pragma unroll
+    for (uint k = 0; k < OV_GROUP / OV_WIDE; ++k) {
+        const ov_wide zero = 0.0f;
+        const ov_wide x =
+            max(max(OV_WIDE_LOAD(k, group) - px, px - OV_WIDE_LOAD(k, group + 3 * OV_GROUP)), zero);
+        const ov_wide y = max(
+            max(OV_WIDE_LOAD(k, group + OV_GROUP) - py, py - OV_WIDE_LOAD(k, group + 4 * OV_GROUP)),
+            zero);
+        const ov_wide z = max(max(OV_WIDE_LOAD(k, group + 2 * OV_GROUP) - pz,
+                                  pz - OV_WIDE_LOAD(k, group + 5 * OV_GROUP)),
+                              zero);
+        OV_WIDE_STORE(fma(x, x, fma(y, y, z * z)), k, distance);
+    }
+}
+
+/* Squared distance to the nearest triangle if that is below `bound`, else bound. */
+static inline float ov_nearest(float px, float py, float pz, float bound, int levels,
+                               const uint *first_group, __global const float *boxes,
+                               __global const float *triangles) {
+    float distance[OV_LEVELS * OV_GROUP];      /* of the boxes of each level's current group */
+    uint pending[OV_LEVELS], group[OV_LEVELS]; /* a bit for each of them still to be visited */
+    int level = levels - 1;
+    bool fresh = true;
+    group[level] = 0;
+    while (level < levels) {
+        float *const own = distance + level * OV_GROUP;
+        if (fresh) {
+            const size_t g = first_group[level] + group[level];
+            ov_box_distances(px, py, pz, boxes + g * (6 * OV_GROUP), own);
+            uint bits = 0;
+            for (uint j = 0; j < OV_GROUP; ++j)
+                bits |= own[j] < bound ? 1u << j : 0u;
+            pending[level] = bits;
+        }
+        float least = bound;
+        uint nearest = OV_GROUP;
+        for (uint bits = pending[level]; bits != 0; bits &= bits - 1) {
+            const uint j = 31 - clz(bits & -bits);
+            if (own[j] < least) {
+                least = own[j];
+                nearest = j;
+            }
+        }
+        fresh = false;
+        if (nearest == OV_GROUP) {
+            ++level;
+            continue;
+        }
+        pending[level] &= ~(1u << nearest);
+        const uint child = group[level] * OV_GROUP + nearest;
+        if (level == 0) {
+            bound =
+                min(bound, ov_leaf_distance(px, py, pz,
+                                            triangles + (size_t)child * (OV_TRIANGLE * OV_LEAF)));
+        } else {
+            group[--level] = child;
+            fresh = true;
+        }
+    }
+    return bound;
+}
+
+/* squared[k] = squared distance of point k, xyz[3 * k + {0, 1, 2}], for `each` consecutive points
+ * per work-item: what one of them has found bounds the distance of the next. Infinite beyond what a
+ * float holds. */
+__kernel void distances(const uint count, const uint each, __global const float *restrict xyz,
+                        const ov_tree tree, __global const float *restrict boxes,
+                        __global const float *restrict triangles,
+                        __global float *restrict squared) {
+    /* A copy, made where all work-items still run together: see lists.cl. */
+    const int levels = (int)tree.levels;
+    uint first_group[OV_LEVELS];
+    for (uint l = 0; l < OV_LEVELS; ++l)
+        first_group[l] = tree.groups[l];
+    const size_t first = get_global_id(0) * (size_t)each;
+    float bound = INFINITY, x = 0.0f, y = 0.0f, z = 0.0f;
+    for (size_t k = first; k < min(first + each, (size_t)count); ++k) {
+        const float dx = xyz[3 * k] - x, dy = xyz[3 * k + 1] - y, dz = xyz[3 * k + 2] - z;
+        x = xyz[3 * k];
+        y = xyz[3 * k + 1];
+        z = xyz[3 * k + 2];
+        /* The triangle found before is at most this far; the factor stands for rounding. */
+        const float reach = (sqrt(bound) + sqrt(fma(dx, dx, fma(dy, dy, dz * dz)))) * 1.00001f;
+        const float limit = fma(reach, reach, FLT_MIN);
+        bound = ov_nearest(x, y, z, limit, levels, first_group, boxes, triangles);
+        if (bound >= limit && limit < INFINITY)
+            bound = ov_nearest(x, y, z, INFINITY, levels, first_group, boxes, triangles);
+        squared[k] = bound;
+    }
+}

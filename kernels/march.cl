@@ -1,0 +1,326 @@
+/*
+ * Marching cubes over one piece of the lattice, brick by brick, with signs in bit masks.
+ *
+ * A piece is a grid of nx * ny * nz bricks (OV_PACK lattice points each, see host/field/bricks.h)
+ * in the corner of a grid with one more brick along each axis: these hold what the neighbouring
+ * pieces found at their first points. A brick owns the cells and the lattice edges whose low corner
+ * is one of its points. Bit j of a mask speaks of point j of the brick.
+ *
+ * A vertex lies on each edge whose ends differ in sign. `crossing` holds four values per brick: the
+ * number of its first vertex, and the masks of its crossed edges along x, y and z. Its vertices are
+ * numbered in that order, by point within each axis, so that any vertex's number follows from its
+ * edge. Edges are named as in host/surface/case_table.h: corner + 8 * axis.
+ *
+ * The values of phi lie elsewhere: those of a brick in pack place[brick].
+ *
+ * The kernels over bricks take several to a work-item where work-items are dear.
+ */
+
+#define CASE_BYTES 16
+
+/* Points of a brick that are its last in x, y and z, for bricks of 4 x 2 x 2. */
+#define LAST_X 0x8888u
+#define LAST_Y 0xf0f0u
+#define LAST_Z 0xff00u
+#define ALL 0xffffu
+
+/* Signs of the points after those of a brick along an axis, from its own and the next brick's. */
+static inline uint after_x(uint own, uint next) {
+    return (own >> 1 & ~LAST_X) | (next << 3 & LAST_X);
+}
+
+static inline uint after_y(uint own, uint next) {
+    return (own >> 4 & ~LAST_Y) | (next << 4 & LAST_Y);
+}
+
+static inline uint after_z(uint own, uint next) {
+    return (own >> 8 & ~LAST_Z) | (next << 8 & LAST_Z);
+}
+
+/* The signs at the eight corners of a brick's cells; corner c at (c & 1, c >> 1 & 1, c >> 2). */
+typedef struct corners {
+    uint at[8];
+} corners;
+
+/* `brick` within the padded grid of nx + 1 by ny + 1 bricks per layer. */
+static inline corners load_corners(__global const uint *sign, uint brick, uint nx, uint ny) {
+    const uint row = nx + 1, layer = row * (ny + 1);
+    corners c;
+    uint upper[4];
+    for (uint z = 0; z < 2; ++z) {
+        __global const uint *const s = sign + brick + z * layer;
+        const uint own[4] = {s[0], after_x(s[0], s[1]), s[row], after_x(s[row], s[row + 1])};
+        for (uint x = 0; x < 2; ++x) {
+            const uint y0 = own[x], y1 = after_y(own[x], own[x + 2]);
+            if (z == 0) {
+                c.at[x] = y0;
+                c.at[x + 2] = y1;
+            } else {
+                upper[x] = y0;
+                upper[x + 2] = y1;
+            }
+        }
+    }
+    for (uint k = 0; k < 4; ++k)
+        c.at[k + 4] = after_z(c.at[k], upper[k]);
+    return c;
+}
+
+/* Cells with corners on both sides. */
+static inline uint mixed_cells(const corners *c) {
+    uint any = 0, all = ALL;
+    for (uint k = 0; k < 8; ++k) {
+        any |= c->at[k];
+        all &= c->at[k];
+    }
+    return any & ~all;
+}
+
+static inline uint case_of(const corners *c, uint point) {
+    uint index = 0;
+    for (uint k = 0; k < 8; ++k)
+        index |= (c->at[k] >> point & 1u) << k;
+    return index;
+}
+
+static inline uint lowest_bit(uint mask) {
+    return 31 - clz(mask & -mask);
+}
+
+/* sign: bit j set where point j of a brick is inside, phi >= c. All bricks of the padded grid. */
+__kernel void march_signs(const uint bricks, const uint run, const float isovalue,
+                          __global const uint *restrict place, __global const float *restrict value,
+                          __global uint *restrict sign) {
+    const uint first = get_global_id(0) * run, end = min(first + run, bricks);
+    for (uint brick = first; brick < end; ++brick) {
+        __global const float *const v = value + (size_t)place[brick] * OV_PACK;
+        uint mask = 0;
+        for (uint j = 0; j < OV_PACK; ++j)
+            mask |= (v[j] >= isovalue ? 1u : 0u) << j;
+        sign[brick] = mask;
+    }
+}
+
+/* For the nx * ny * nz bricks of the piece, in raster order: masks of crossed edges into `crossing`
+ * (of the padded grid), number of triangles into `triangles` (of the piece). */
+__kernel void march_count(const uint nx, const uint ny, const uint nz, const uint run,
+                          __global const uint *restrict sign, __global const uchar *restrict cases,
+                          __global uint4 *restrict crossing, __global uint *restrict triangles) {
+    const uint bricks = nx * ny * nz;
+    const uint first = get_global_id(0) * run, end = min(first + run, bricks);
+    for (uint k = first; k < end; ++k) {
+        const uint brick = (k / (nx * ny) * (ny + 1) + k / nx % ny) * (nx + 1) + k % nx;
+        const corners c = load_corners(sign, brick, nx, ny);
+        uint count = 0;
+        for (uint cells = mixed_cells(&c); cells; cells &= cells - 1)
+            count += cases[case_of(&c, lowest_bit(cells)) * CASE_BYTES];
+        crossing[brick] = (uint4)(0, c.at[0] ^ c.at[1], c.at[0] ^ c.at[2], c.at[0] ^ c.at[4]);
+        triangles[k] = count;
+    }
+}
+
+/* values[k] = those of the k-th brick of the list. */
+__kernel void march_get(const uint count, __global const uint *restrict list,
+                        __global const uint *restrict place, __global const float *restrict value,
+                        __global float *restrict values) {
+    const uint k = get_global_id(0);
+    if (k >= count)
+        return;
+    __global const float *const from = value + (size_t)place[list[k]] * OV_PACK;
+    for (uint j = 0; j < OV_PACK; ++j)
+        values[(size_t)k * OV_PACK + j] = from[j];
+}
+
+/* The other way, with the bricks' crossings. */
+__kernel void march_put(const uint count, __global const uint *restrict list,
+                        __global const uint *restrict place, __global const float *restrict values,
+                        __global const uint4 *restrict crossings, __global float *restrict value,
+                        __global uint4 *restrict crossing) {
+    const uint k = get_global_id(0);
+    if (k >= count)
+        return;
+    __global float *const to = value + (size_t)place[list[k]] * OV_PACK;
+    for (uint j = 0; j < OV_PACK; ++j)
+        to[j] = values[(size_t)k * OV_PACK + j];
+    crossing[list[k]] = crossings[k];
+}
+
+/* Number of a point within its brick, and of its brick within the padded grid. */
+typedef struct spot {
+    uint brick, point;
+} spot;
+
+/* The point at `corner` of the cell of `point` in `brick`. */
+static inline spot move_to_corner(uint brick, uint point, uint corner, uint nx, uint ny) {
+    uint x = (point & 3u) + (corner & 1u), y = (point >> 2 & 1u) + (corner >> 1 & 1u),
+         z = (point >> 3) + (corner >> 2);
+    spot p;
+    p.brick = brick + x / OV_BRICK_X + (nx + 1) * (y / OV_BRICK_Y + (ny + 1) * (z / OV_BRICK_Z));
+    p.point = x % OV_BRICK_X + OV_BRICK_X * (y % OV_BRICK_Y + OV_BRICK_Y * (z % OV_BRICK_Z));
+    return p;
+}
+
+/* Where phi is c between a at 0 and b at 1. Interpolates ln phi if `logarithmic`: the start of a
+ * search, as ln phi is quadratic about a single atom. */
+static inline float crossing_at(float a, float b, float isovalue, int logarithmic) {
+    if (logarithmic) {
+        a = log(max(a, 1e-37f));
+        b = log(max(b, 1e-37f));
+        isovalue = log(isovalue);
+    }
+    const float t = (isovalue - a) / (b - a);
+    return t >= 0.0f && t <= 1.0f ? t : 0.5f; /* not a number where phi overflows */
+}
+
+/* The vertices of the listed bricks. Each entry of the list is {brick, first vertex within the
+ * piece, first triangle, 0}. edge: x + (y << 7) + (z << 14) of the low end in lattice points from
+ * the piece's corner, axis << 20, and 1 << 22 if the low end is inside. t: where on the edge. */
+__kernel void march_vertices(const uint count, __global const uint4 *restrict list, const uint nx,
+                             const uint ny, const float isovalue, const int logarithmic,
+                             __global const uint *restrict place,
+                             __global const float *restrict value,
+                             __global const uint4 *restrict crossing, __global uint *restrict edge,
+                             __global float *restrict t) {
+    const uint item = get_global_id(0);
+    if (item >= count)
+        return;
+    const uint brick = list[item].x;
+    const uint4 crossed = crossing[brick];
+    const uint mask[3] = {crossed.y, crossed.z, crossed.w};
+    const uint bx = brick % (nx + 1), by = brick / (nx + 1) % (ny + 1),
+               bz = brick / ((nx + 1) * (ny + 1));
+    uint at = list[item].y;
+    for (uint axis = 0; axis < 3; ++axis)
+        for (uint points = mask[axis]; points; points &= points - 1, ++at) {
+            const uint point = lowest_bit(points);
+            const spot end = move_to_corner(brick, point, 1u << axis, nx, ny);
+            const float a = value[(size_t)place[brick] * OV_PACK + point];
+            const float b = value[(size_t)place[end.brick] * OV_PACK + end.point];
+            const uint x = bx * OV_BRICK_X + (point & 3u), y = by * OV_BRICK_Y + (point >> 2 & 1u),
+                       z = bz * OV_BRICK_Z + (point >> 3);
+            edge[at] = x | y << 7 | z << 14 | axis << 20 | (a >= isovalue ? 1u : 0u) << 22;
+            t[at] = crossing_at(a, b, isovalue, logarithmic);
+        }
+}
+
+/* The triangles of the listed bricks, three vertex numbers each. */
+__kernel void march_triangles(const uint count, __global const uint4 *restrict list, const uint nx,
+                              const uint ny, __global const uint *restrict sign,
+                              __global const uchar *restrict cases,
+                              __global const uint4 *restrict crossing,
+                              __global uint *restrict corner) {
+    const uint item = get_global_id(0);
+    if (item >= count)
+        return;
+    const uint brick = list[item].x;
+    const corners c = load_corners(sign, brick, nx, ny);
+    size_t at = (size_t)list[item].z * 3;
+    for (uint cells = mixed_cells(&c); cells; cells &= cells - 1) {
+        const uint point = lowest_bit(cells);
+        __global const uchar *const entry = cases + case_of(&c, point) * CASE_BYTES;
+        const uint edges = 3u * entry[0];
+        for (uint k = 1; k <= edges; ++k, ++at) {
+            const uint axis = entry[k] >> 3;
+            const spot low = move_to_corner(brick, point, entry[k] & 7u, nx, ny);
+            const uint4 crossed = crossing[low.brick];
+            const uint before = (1u << low.point) - 1;
+            const uint own = axis == 0 ? crossed.y : axis == 1 ? crossed.z : crossed.w;
+            corner[at] = crossed.x + (axis > 0 ? popcount(crossed.y) : 0) +
+                         (axis > 1 ? popcount(crossed.z) : 0) + popcount(own & before);
+        }
+    }
+}
+
+/* ---- vertices on the surface -------------------------------------------------------------- */
+
+#if OV_VECTOR == 1
+#define TO_FLOAT(x) convert_float(x)
+#define ANY(x) ((x) != 0)
+#else
+#define TO_FLOAT(x) OV_JOIN(convert_float, OV_VECTOR)(x)
+#define ANY(x) any(x)
+#endif
+
+/* A bracket must be this much smaller than the last of Newton's steps: it halves its error, where
+ * they square it. */
+#define HALVED 64.0f
+
+/* Moves the vertices along their edges to where phi = c, by Newton's steps on ln phi, and by
+ * halving the bracket where such a step would leave it. A step under `close` (in lattice steps) is
+ * the last one: the error that it leaves is of the order of its square. With steps = 0 vertices
+ * stay.
+ *
+ * Vertices in packs; start, item, terms as for field(). normal: OV_PACK x, y, z per pack of the
+ * unit vector against the gradient, 0 where that vanishes. */
+__kernel void march_refine(const uint packs, const float spacing, const float isovalue,
+                           const uint steps, const float close, __global const uint *restrict edge,
+                           __global const uint *restrict start, __global const uint *restrict item,
+                           __global const ov_term *restrict terms, __global float *restrict t,
+                           __global float *restrict normal) {
+    const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
+    if (pack >= packs)
+        return;
+    __global const int *const codes = (__global const int *)edge + (size_t)pack * OV_PACK;
+    __global float *const ts = t + (size_t)pack * OV_PACK;
+    __global float *const out = normal + (size_t)pack * (3 * OV_PACK);
+    const uint first = start[pack], end = start[pack + 1];
+    const ov_vec zero = 0.0f, one = 1.0f, h = spacing;
+    for (uint v = 0; v < OV_VECTORS; ++v) {
+        const uint place = v * OV_LANES + lane;
+        const ov_ivec code = OV_LOAD(place, codes);
+        const ov_vec x0 = TO_FLOAT(code & 127) * h, y0 = TO_FLOAT(code >> 7 & 127) * h,
+                     z0 = TO_FLOAT(code >> 14 & 63) * h;
+        const ov_ivec axis = code >> 20 & 3, low_inside = (code >> 22 & 1) == 1;
+        const ov_vec ux = axis == 0 ? one : zero, uy = axis == 1 ? one : zero,
+                     uz = axis == 2 ? one : zero;
+        ov_vec s = OV_LOAD(place, ts), from = zero, to = one, gx, gy, gz;
+        ov_ivec moving = s >= zero;
+        for (uint step = 0;; ++step) {
+            const ov_vec px = fma(s * h, ux, x0), py = fma(s * h, uy, y0), pz = fma(s * h, uz, z0);
+            ov_vec sum = 0.0f;
+            gx = gy = gz = zero;
+            for (uint k = first; k < end; ++k) {
+                const ov_term term = terms[item[k]];
+                const ov_vec x = px - term.x, y = py - term.y, z = pz - term.z;
+                const ov_vec e = ov_value(term, x, y, z);
+                sum += e;
+                /* -grad phi / ln 2 */
+                gx =
+                    fma(e, fma(x, (ov_vec)(2.0f * term.xx), fma(y, (ov_vec)(term.xy), z * term.xz)),
+                        gx);
+                gy =
+                    fma(e, fma(y, (ov_vec)(2.0f * term.yy), fma(x, (ov_vec)(term.xy), z * term.yz)),
+                        gy);
+                gz =
+                    fma(e, fma(z, (ov_vec)(2.0f * term.zz), fma(x, (ov_vec)(term.xz), y * term.yz)),
+                        gz);
+            }
+            if (step >= steps)
+                break;
+            const ov_ivec beyond = (sum >= isovalue) == low_inside;
+            from = moving && beyond ? s : from;
+            to = moving && !beyond ? s : to;
+            const ov_vec slope = fma(gx, ux, fma(gy, uy, gz * uz)) * (M_LN2_F * h);
+            const ov_vec newton =
+                sum == isovalue ? s : s + log(max(sum, 1e-37f) / isovalue) * sum / slope;
+            const ov_ivec within = newton >= from - close && newton <= to + close;
+            const ov_vec next = within ? clamp(newton, from, to) : 0.5f * (from + to);
+            const ov_vec left = within ? fabs(next - s) : (to - from) * HALVED;
+            s = moving ? next : s;
+            moving = moving && left >= close;
+            if (!ANY(moving))
+                break;
+        }
+        const ov_vec largest = max(fabs(gx), max(fabs(gy), fabs(gz)));
+        const ov_ivec usable = largest > zero && largest < INFINITY;
+        const ov_vec scale = usable ? one / largest : zero;
+        gx *= scale;
+        gy *= scale;
+        gz *= scale;
+        const ov_vec length = usable ? one / sqrt(fma(gx, gx, fma(gy, gy, gz * gz))) : zero;
+        OV_STORE(s, place, ts);
+        OV_STORE(usable ? gx * length : zero, place, out);
+        OV_STORE(usable ? gy * length : zero, place, out + OV_PACK);
+        OV_STORE(usable ? gz * length : zero, place, out + 2 * OV_PACK);
+    }
+}

@@ -1,0 +1,130 @@
+# Files for other programs: what is written follows the extension, from a model or a molecule.
+make_helix 6 a.xyzr
+cat >m.ovoid <<'END'
+# ovoid model 1
+# decay: 0.5
+# isovalue: 1
+# amplitude decay1 decay2 decay3 x y z alpha beta gamma
+2.5 0.1 0.2 0.3 1 -2 3.25 0.5 0 -1
+0.5 0.2 0.2 0.2 4 -2 3.25 0 0 0
+END
+
+for command in "export --help" "export -h" "help export"; do
+    run "$OVOID" $command
+    expect_code 0
+    expect_silent
+    for text in "Usage: ovoid export INPUT" "Exit codes:" "Examples:" "OVOID_DEVICE" ".bild" ".cxc" \
+        ".py" ".gmm" ".json" ".mrc" ".dx" --output --as --format --device --quiet --isovalue \
+        --spacing --decay --colour --opacity; do
+        expect_out "$text"
+    done
+done
+
+# Ellipsoids need no device.
+for name in m.bild m.cxc m.py m.gmm m.json; do
+    run env OVOID_DEVICE="no such device" "$OVOID" export m.ovoid -o $name
+    expect_code 0
+    expect_silent
+    expect_out "m.ovoid: 2 ellipsoids, written to $name as "
+done
+grep -q '"amplitude": 2.5' m.json || fail "the JSON should hold the model"
+run "$OVOID" export m.ovoid -o m.cxc --colour ff8000 --opacity 0 --isovalue 2 -q
+expect_code 0
+expect_no_out
+grep -q 'color #ff800000 ' m.cxc || fail "colour and opacity should be as asked"
+grep -q 'at isovalue 2$' m.cxc || fail "the isovalue should be as asked"
+expect_files a.xyzr m.ovoid m.bild m.cxc m.py m.gmm m.json
+
+# Standard streams; a model is known by its first line, whatever its name.
+cp m.ovoid other.txt
+run "$OVOID" export other.txt --as json -o -
+expect_code 0
+expect_silent
+cmp -s "$out" m.json || fail "standard output should be as the file"
+"$OVOID" export - --as json -o piped.json <m.ovoid >"$out" 2>"$err"
+code=$?
+expect_code 0
+expect_out "standard input: 2 ellipsoids"
+cmp -s piped.json m.json || fail "standard input should be as the file"
+rm other.txt m.bild m.cxc m.py m.gmm m.json piped.json
+
+wrong() {
+    wanted=$1
+    text=$2
+    shift 2
+    run "$OVOID" export "$@"
+    expect_code "$wanted"
+    expect_no_out
+    expect_err "ovoid: error: "
+    expect_err "$text"
+    expect_files a.xyzr m.ovoid
+}
+wrong 2 "which model?"
+wrong 2 "one input at a time, but 'b' follows 'm.ovoid'" m.ovoid b -o m.py
+wrong 2 "where to?" m.ovoid
+wrong 2 "are the same file" m.ovoid -o ./m.ovoid
+wrong 2 "one of .bild, .cxc, .py, .gmm, .json, .mrc, .map, .ccp4, .dx" m.ovoid -o m.pdb
+wrong 2 "name a format" m.ovoid -o -
+wrong 2 "--as takes bild, cxc, pymol, gmm, json, ccp4 or dx, not 'pdb'" m.ovoid -o - --as pdb
+wrong 2 "--colour takes six hexadecimal digits such as 4d8ccc, not 'red'" m.ovoid -o m.py --color red
+wrong 2 "--opacity is 2, but must be at most 1" m.ovoid -o m.py --opacity 2
+wrong 2 "--spacing is 0, but must be above 0" m.ovoid -o m.mrc --spacing 0
+wrong 2 "did you mean '--spacing'?" m.ovoid -o m.mrc --spcing 1
+wrong 2 "a molecule has no ellipsoids" a.xyzr -o a.py
+wrong 2 "--format takes pqr, xyzr or ovoid, not 'pdb'" a.xyzr -o m.py --format pdb
+wrong 3 "missing.ovoid" missing.ovoid -o m.py
+wrong 4 "there is no folder 'no'" m.ovoid -o no/m.py
+wrong 4 "Is a directory" m.ovoid -o .
+if [ -w /dev/full ]; then
+    wrong 4 "cannot write '/dev/full': No space left on device" m.ovoid -o /dev/full --as json
+    "$OVOID" export m.ovoid -o - --as gmm >/dev/full 2>"$err"
+    code=$?
+    expect_code 4
+    expect_err "cannot write standard output: No space left on device"
+fi
+
+need_device
+wrong 5 "no such device" a.xyzr -o a.mrc --device "no such device"
+wrong 6 "choose a larger spacing" a.xyzr -o a.mrc --spacing 1e-5
+for name in a.mrc a.map a.ccp4 a.dx; do
+    run "$OVOID" export a.xyzr -o $name --spacing 1 --decay 0.4
+    expect_code 0
+    expect_silent
+    expect_out "a.xyzr: 6 atoms, written to $name as "
+done
+cmp -s a.mrc a.map || fail "two runs should give the same map"
+grep -aq 'field of 6 atoms, decay 0.4 ' a.mrc || fail "the map should say what it is"
+"$OVOID" export - --format xyzr --as mrc --spacing 1 --decay 0.4 -o b.mrc <a.xyzr >"$out" 2>"$err"
+code=$?
+expect_code 0
+cmp -s a.mrc b.mrc || fail "standard input should be as the file"
+
+# What is appended to, like a pipe, cannot be gone back in: the map follows what was there.
+cp a.mrc c.mrc
+"$OVOID" export a.xyzr -o - --as mrc --spacing 1 --decay 0.4 >>c.mrc 2>"$err"
+code=$?
+expect_code 0
+size=$(($(wc -c <a.mrc)))
+[ $(($(wc -c <c.mrc))) -eq $((2 * size)) ] || fail "a whole map should be appended"
+head -c $size c.mrc | cmp -s - a.mrc || fail "what was there should stay"
+tail -c $((size - 1024)) a.mrc >a.values
+tail -c $((size - 1024)) c.mrc | cmp -s - a.values || fail "the values should be the same"
+
+# Ctrl-C leaves nothing.
+rm -f a.mrc a.map a.ccp4 a.dx b.mrc c.mrc a.values
+env --default-signal=INT true 2>/dev/null || skip "env cannot reset signals"
+last="ovoid export a.xyzr -o a.dx --spacing 0.01, then SIGINT"
+env --default-signal=INT "$OVOID" export a.xyzr -o a.dx --spacing 0.01 >"$out" 2>"$err" &
+pid=$!
+tries=0
+until [ -n "$(find . -name '.ovoid-*.tmp' -size +0)" ]; do
+    tries=$((tries + 1))
+    [ $tries -lt 600 ] && kill -0 $pid || fail "the export did not start"
+    sleep 0.05
+done
+kill -s INT $pid
+wait $pid
+code=$?
+expect_code 130
+expect_err "ovoid: error: interrupted"
+expect_files a.xyzr m.ovoid

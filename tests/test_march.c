@@ -1,0 +1,777 @@
+/*
+ * Marching cubes: the table of cases for all of them and all pairs of neighbours; meshes against a
+ * plain one in double, closed forms and topology; the seams between pieces.
+ */
+#include "support.h"
+
+#include "fit/model.h"
+#include "reference/march.h"
+#include "surface/case_table.h"
+#include "surface/march.h"
+#include "surface/mesh.h"
+
+#define PI 3.14159265358979323846
+#define APBS_FAS2 "/usr/share/apbs/examples/misc/fas2.pqr"
+
+static const uint64_t whole[3] = OV_MARCH_PIECE;
+
+/* ---- the table of cases ------------------------------------------------------------------- */
+
+static void edge_ends(unsigned edge, unsigned end[2]) {
+    end[0] = edge % 8;
+    end[1] = end[0] | 1u << edge / 8;
+}
+
+static bool is_inside(unsigned index, unsigned corner) {
+    return index >> corner & 1u;
+}
+
+static bool is_crossed(unsigned index, unsigned edge) {
+    unsigned end[2];
+    edge_ends(edge, end);
+    return end[0] != end[1] && (edge % 8 & 1u << edge / 8) == 0 &&
+           is_inside(index, end[0]) != is_inside(index, end[1]);
+}
+
+static void middle_of(unsigned edge, double at[3]) {
+    unsigned end[2];
+    edge_ends(edge, end);
+    for (unsigned axis = 0; axis < 3; ++axis)
+        at[axis] = 0.5 * ((end[0] >> axis & 1u) + (end[1] >> axis & 1u));
+}
+
+/* The face that two edges share, as 2 * axis + side, or 6. */
+static unsigned common_face(unsigned a, unsigned b) {
+    double p[3], q[3];
+    middle_of(a, p);
+    middle_of(b, q);
+    for (unsigned axis = 0; axis < 3; ++axis)
+        if (p[axis] == q[axis] && p[axis] != 0.5)
+            return 2 * axis + (p[axis] > 0.5);
+    return 6;
+}
+
+static double triple(const double a[3], const double b[3], const double c[3]) {
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+           a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+/* The inside lies to the right of a segment seen from outside the cell: so do triangles whose sides
+ * they are face outward. */
+static void expect_outward(unsigned index, unsigned from, unsigned to) {
+    const unsigned face = common_face(from, to);
+    double start[3], end[3], normal[3] = {0}, along[3], inward[3];
+    unsigned ends[2];
+    assert_true(face < 6);
+    middle_of(from, start);
+    middle_of(to, end);
+    edge_ends(from, ends);
+    normal[face / 2] = face % 2 ? 1.0 : -1.0;
+    const unsigned inside = is_inside(index, ends[0]) ? ends[0] : ends[1];
+    for (unsigned axis = 0; axis < 3; ++axis) {
+        along[axis] = end[axis] - start[axis];
+        inward[axis] = (inside >> axis & 1u) - start[axis];
+    }
+    assert_true(triple(normal, along, inward) < 0.0);
+}
+
+static void loops_are_closed_and_face_outward(void **state) {
+    (void)state;
+    for (unsigned index = 0; index < OV_CASES; ++index) {
+        uint8_t next[OV_CELL_EDGES];
+        unsigned arrivals[OV_CELL_EDGES] = {0};
+        ov_case_segments(index, next);
+        for (unsigned edge = 0; edge < OV_CELL_EDGES; ++edge) {
+            assert_true((next[edge] != OV_CELL_EDGES) == is_crossed(index, edge));
+            if (next[edge] == OV_CELL_EDGES)
+                continue;
+            ++arrivals[next[edge]];
+            expect_outward(index, edge, next[edge]);
+        }
+        for (unsigned edge = 0; edge < OV_CELL_EDGES; ++edge)
+            assert_int_equal(arrivals[edge], is_crossed(index, edge));
+    }
+}
+
+/* Every segment is one side of one triangle; every other side is a cut through the cell, there once
+ * in each direction and in no face. */
+static void triangles_fill_the_loops(void **state) {
+    (void)state;
+    ov_case_table table;
+    ov_case_table_make(&table);
+    for (unsigned index = 0; index < OV_CASES; ++index) {
+        unsigned sides[OV_CELL_EDGES][OV_CELL_EDGES] = {{0}};
+        uint8_t next[OV_CELL_EDGES];
+        const uint8_t *const entry = table.entry[index];
+        ov_case_segments(index, next);
+        assert_true(entry[0] <= OV_CASE_TRIANGLES);
+        for (unsigned t = 0; t < entry[0]; ++t)
+            for (unsigned k = 0; k < 3; ++k)
+                ++sides[entry[1 + 3 * t + k]][entry[1 + 3 * t + (k + 1) % 3]];
+        for (unsigned a = 0; a < OV_CELL_EDGES; ++a)
+            for (unsigned b = 0; b < OV_CELL_EDGES; ++b) {
+                const bool segment = next[a] == b, reverse = next[b] == a;
+                if (segment || reverse) {
+                    assert_int_equal(sides[a][b], segment);
+                } else if (sides[a][b] > 0) {
+                    assert_int_equal(sides[a][b], 1);
+                    assert_int_equal(sides[b][a], 1);
+                    assert_int_equal(common_face(a, b), 6);
+                }
+            }
+    }
+}
+
+/* Segments of a case on one face, as pairs of edges with the face's axis left out. */
+static void segments_on(unsigned index, unsigned axis, unsigned side,
+                        bool segment[OV_CELL_EDGES][OV_CELL_EDGES]) {
+    uint8_t next[OV_CELL_EDGES];
+    const unsigned flip = side << axis;
+    memset(segment, 0, sizeof(bool[OV_CELL_EDGES][OV_CELL_EDGES]));
+    ov_case_segments(index, next);
+    for (unsigned edge = 0; edge < OV_CELL_EDGES; ++edge)
+        if (next[edge] != OV_CELL_EDGES && common_face(edge, next[edge]) == 2 * axis + side)
+            segment[edge & ~flip][next[edge] & ~flip] = true;
+}
+
+static bool same_face(unsigned below, unsigned above, unsigned axis) {
+    for (unsigned corner = 0; corner < 8; ++corner)
+        if (!(corner >> axis & 1u) &&
+            is_inside(below, corner | 1u << axis) != is_inside(above, corner))
+            return false;
+    return true;
+}
+
+static void neighbours_agree_on_their_face(void **state) {
+    (void)state;
+    static bool below[OV_CASES][OV_CELL_EDGES][OV_CELL_EDGES],
+        above[OV_CASES][OV_CELL_EDGES][OV_CELL_EDGES];
+    unsigned pairs = 0;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+        for (unsigned index = 0; index < OV_CASES; ++index) {
+            segments_on(index, axis, 1, below[index]);
+            segments_on(index, axis, 0, above[index]);
+        }
+        for (unsigned a = 0; a < OV_CASES; ++a)
+            for (unsigned b = 0; b < OV_CASES; ++b) {
+                if (!same_face(a, b, axis))
+                    continue;
+                ++pairs;
+                for (unsigned from = 0; from < OV_CELL_EDGES; ++from)
+                    for (unsigned to = 0; to < OV_CELL_EDGES; ++to)
+                        assert_int_equal(below[a][from][to], above[b][to][from]);
+            }
+    }
+    assert_int_equal(pairs, 3 * 16 * 16 * 16);
+}
+
+/* ---- meshes ------------------------------------------------------------------------------- */
+
+static int compare_keys(const void *a, const void *b) {
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Every edge has two triangles, which run along it in opposite directions; every vertex is used.
+ * Returns vertices - edges + triangles. */
+static int64_t expect_closed(const ovoid_mesh *mesh) {
+    const size_t sides = 3 * ovoid_mesh_triangles(mesh), vertices = ovoid_mesh_vertices(mesh);
+    const uint32_t *const corner = ovoid_mesh_corners(mesh);
+    uint64_t *const forward = test_alloc(sides, sizeof *forward), *const backward = test_alloc(
+                                                                      sides, sizeof *backward);
+    bool *const used = test_alloc(vertices, sizeof *used);
+    for (size_t k = 0; k < sides; ++k) {
+        const uint64_t a = corner[k], b = corner[k % 3 == 2 ? k - 2 : k + 1];
+        assert_true(a < vertices && b < vertices && a != b);
+        forward[k] = a << 32 | b;
+        backward[k] = b << 32 | a;
+        used[a] = true;
+    }
+    qsort(forward, sides, sizeof *forward, compare_keys);
+    qsort(backward, sides, sizeof *backward, compare_keys);
+    for (size_t k = 0; k < sides; ++k) {
+        assert_true(k == 0 || forward[k] != forward[k - 1]);
+        assert_true(forward[k] == backward[k]);
+    }
+    for (size_t v = 0; v < vertices; ++v)
+        assert_true(used[v]);
+    free(forward);
+    free(backward);
+    free(used);
+    return (int64_t)vertices - (int64_t)sides / 2 + (int64_t)sides / 3;
+}
+
+/* Vertices lie on edges of the lattice of multiples of the spacing. Returns the axis of vertex v's
+ * edge and its low end; a vertex at a lattice point is taken for one on an edge along x. */
+static unsigned edge_of(const ovoid_mesh *mesh, size_t v, double spacing, int64_t low[3]) {
+    const double *const at = ovoid_mesh_xyz(mesh) + 3 * v;
+    unsigned axis = 0;
+    double furthest = -1.0;
+    for (unsigned k = 0; k < 3; ++k) {
+        const double u = at[k] / spacing, off = fabs(u - round(u));
+        low[k] = (int64_t)round(u);
+        if (off > furthest) {
+            furthest = off;
+            axis = k;
+        }
+    }
+    for (unsigned k = 0; k < 3; ++k)
+        if (k != axis)
+            expect_near(at[k] / spacing, (double)low[k], 1e-9 * (1.0 + fabs((double)low[k])),
+                        "a vertex's lattice index");
+    low[axis] = (int64_t)floor(at[axis] / spacing);
+    return axis;
+}
+
+/* Closed, on the lattice, on the surface to within 1e-5 angstrom and beyond that only as far as phi
+ * itself is rounded, normals along the gradient. Returns vertices - edges + triangles. */
+static int64_t expect_surface(const ovoid_mesh *mesh, const ov_quadric *quadrics, size_t count,
+                              const ovoid_mesh_options *options) {
+    const double c = options->isovalue;
+    double worst_distance = 0.0, worst_angle = 0.0;
+    for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
+        const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
+        const float *const n = ovoid_mesh_normals(mesh) + 3 * v;
+        reference_sum gradient[3];
+        int64_t low[3];
+        const reference_sum phi = reference_field(quadrics, count, y);
+        reference_gradient(quadrics, count, y, gradient);
+        const unsigned axis = edge_of(mesh, v, options->spacing, low);
+        const double length =
+            sqrt(gradient[0].value * gradient[0].value + gradient[1].value * gradient[1].value +
+                 gradient[2].value * gradient[2].value);
+        const double rounding = 3.0 * FLT_EPSILON * phi.scale + 1e-6 * c;
+        const double miss = fabs(phi.value - c);
+        if (options->vertices == OVOID_VERTEX_EXACT) {
+            const double slope = fabs(gradient[axis].value);
+            assert_true(miss <= 1e-5 * length + rounding);
+            if (slope > 0.1 * c)
+                worst_distance = fmax(worst_distance, miss / length);
+        }
+        double cosine = 0.0, square = 0.0;
+        for (int k = 0; k < 3; ++k) {
+            cosine -= n[k] * gradient[k].value / length;
+            square += (double)n[k] * n[k];
+        }
+        expect_near(square, 1.0, 1e-5, "a normal's square");
+        if (length > 0.1 * c)
+            worst_angle = fmax(worst_angle, 1.0 - cosine);
+    }
+    print_message("%zu vertices, at most %.2g from the surface, 1 - cos of normals %.2g\n",
+                  ovoid_mesh_vertices(mesh), worst_distance, worst_angle);
+    assert_true(worst_angle < 1e-6);
+    return expect_closed(mesh);
+}
+
+static ov_quadric *quadrics_of(const double *xyzr, size_t atoms, double decay) {
+    ov_quadric *const quadrics = test_alloc(atoms, sizeof *quadrics);
+    for (size_t i = 0; i < atoms; ++i)
+        ov_quadric_of_atom(xyzr + 4 * i, decay, &quadrics[i]);
+    return quadrics;
+}
+
+static ovoid_mesh *mesh_atoms(ovoid_context *context, const double *xyzr, size_t atoms,
+                              double decay, const ovoid_mesh_options *options) {
+    ovoid_molecule *molecule = NULL;
+    ovoid_mesh *mesh = NULL;
+    test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
+    test_check(context, ovoid_molecule_mesh(context, molecule, decay, options, &mesh));
+    ovoid_molecule_destroy(&molecule);
+    return mesh;
+}
+
+/* Meshes atoms, holds the mesh to the twin and to this characteristic and number of components. */
+static ovoid_mesh *expect_atoms(ovoid_context *context, const double *xyzr, size_t atoms,
+                                double decay, const ovoid_mesh_options *options, int64_t euler,
+                                size_t components) {
+    ov_quadric *const quadrics = quadrics_of(xyzr, atoms, decay);
+    ovoid_mesh *const mesh = mesh_atoms(context, xyzr, atoms, decay, options);
+    assert_int_equal(expect_surface(mesh, quadrics, atoms, options), euler);
+    assert_int_equal(ovoid_mesh_components(mesh), components);
+    free(quadrics);
+    return mesh;
+}
+
+static ovoid_mesh_options options_of(double isovalue, double spacing, ovoid_vertex_rule rule) {
+    ovoid_mesh_options options;
+    ovoid_mesh_options_init(&options);
+    assert_true(options.isovalue == 1.0 && options.spacing == OVOID_DEFAULT_MESH_SPACING);
+    assert_true(options.vertices == OVOID_VERTEX_EXACT);
+    options.isovalue = isovalue;
+    options.spacing = spacing;
+    options.vertices = rule;
+    return options;
+}
+
+/* ---- closed forms ------------------------------------------------------------------------- */
+
+/* One atom: a sphere of radius sqrt(r^2 - ln c / d). */
+static void one_atom_is_a_sphere(void **state) {
+    static const struct {
+        double x, y, z, r, decay, c, spacing;
+    } cases[] = {
+        {0.1, -0.2, 0.3, 1.7, 0.5, 1.0, 0.5},   {0.0, 0.0, 0.0, 2.0, 0.5, 1.0, 0.5},
+        {0.25, 0.25, 0.25, 1.5, 0.5, 1.0, 0.5}, {-7.3, 4.1, 90.2, 1.2, 0.9, 1.0, 0.3},
+        {1.0, 2.0, 3.0, 0.0, 0.5, 0.5, 0.25},   {12345.67, -8901.2, 345.6, 1.5, 0.5, 1.3, 0.4},
+        {0.3, 0.2, 0.1, 1.0, 0.5, 1e-20, 0.7},  {0.3, 0.2, 0.1, 6.0, 0.5, 1e6, 0.4},
+        {0.0, 0.0, 0.0, 0.4, 3.0, 1.0, 0.7},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+        const double xyzr[4] = {cases[k].x, cases[k].y, cases[k].z, cases[k].r};
+        const ovoid_mesh_options options =
+            options_of(cases[k].c, cases[k].spacing, OVOID_VERTEX_EXACT);
+        const double radius = sqrt(cases[k].r * cases[k].r - log(cases[k].c) / cases[k].decay);
+        ovoid_mesh *mesh = expect_atoms(*state, xyzr, 1, cases[k].decay, &options, 2, 1);
+        for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
+            const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
+            const double distance =
+                sqrt((y[0] - xyzr[0]) * (y[0] - xyzr[0]) + (y[1] - xyzr[1]) * (y[1] - xyzr[1]) +
+                     (y[2] - xyzr[2]) * (y[2] - xyzr[2]));
+            expect_near(distance, radius, 1e-5, "a vertex's distance from the centre");
+        }
+        const double steps = radius / cases[k].spacing, volume = 4.0 / 3.0 * PI * pow(radius, 3);
+        const double got = ovoid_mesh_volume(mesh) / volume;
+        assert_true(got > 0.0 && got < 1.0 && (steps < 2.0 || got > 1.0 - 1.5 / (steps * steps)));
+        ovoid_mesh_destroy(&mesh);
+    }
+}
+
+/* At spacing 0.3, areas and volumes to 0.1 %. */
+static void spheres_and_ellipsoids_have_their_measures(void **state) {
+    const ovoid_mesh_options options = options_of(1.0, 0.3, OVOID_VERTEX_EXACT);
+    const double atom[4] = {0.11, 0.07, -0.31, 1.8}, radius = 1.8;
+    ovoid_mesh *mesh = mesh_atoms(*state, atom, 1, 0.5, &options);
+    expect_near(ovoid_mesh_smooth_area(mesh) / (4.0 * PI * radius * radius), 1.0, 1e-3, "area");
+    expect_near(ovoid_mesh_smooth_volume(mesh) / (4.0 / 3.0 * PI * pow(radius, 3)), 1.0, 1e-3,
+                "volume");
+    ovoid_mesh_destroy(&mesh);
+
+    const ovoid_ellipsoid ellipsoid = {
+        .amplitude = 5.0, .decay = {0.6, 0.2, 0.08}, .angle = {0.7, -1.1, 2.0}};
+    ovoid_model *model = NULL;
+    ov_quadric quadric;
+    double volume = 4.0 / 3.0 * PI;
+    for (int k = 0; k < 3; ++k)
+        volume *= sqrt(log(5.0) / ellipsoid.decay[k]);
+    ov_quadric_of_ellipsoid(&ellipsoid, &quadric);
+    test_check(*state, ovoid_model_create(*state, &ellipsoid, 1, 0.5, 1.0, &model));
+    test_check(*state, ovoid_model_mesh(*state, model, &options, &mesh));
+    assert_int_equal(expect_surface(mesh, &quadric, 1, &options), 2);
+    expect_near(ovoid_mesh_smooth_volume(mesh) / volume, 1.0, 1e-3, "volume");
+    ovoid_mesh_destroy(&mesh);
+    ovoid_model_destroy(&model);
+}
+
+/* ---- shapes ------------------------------------------------------------------------------- */
+
+static void two_spheres(void **state) {
+    const ovoid_mesh_options options = options_of(1.0, 0.4, OVOID_VERTEX_EXACT);
+    const double touching[8] = {0.0, 0.0, 0.0, 1.5, 2.2, 1.1, 0.9, 1.5},
+                 apart[8] = {0.0, 0.0, 0.0, 1.5, 5.2, 3.1, 2.9, 1.2};
+    ovoid_mesh *mesh = expect_atoms(*state, touching, 2, 0.5, &options, 2, 1);
+    assert_true(ovoid_mesh_volume(mesh) > 4.0 / 3.0 * PI * pow(1.5, 3));
+    ovoid_mesh_destroy(&mesh);
+    mesh = expect_atoms(*state, apart, 2, 0.5, &options, 4, 2);
+    for (size_t k = 0; k < 2; ++k)
+        assert_true(ovoid_mesh_component(mesh, k)->outer);
+    ovoid_mesh_destroy(&mesh);
+}
+
+static void a_ring_has_a_hole(void **state) {
+    enum { RING = 14 };
+    double xyzr[4 * RING];
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    for (size_t i = 0; i < RING; ++i) {
+        const double angle = 2.0 * PI * (double)i / RING;
+        xyzr[4 * i] = 5.0 * cos(angle);
+        xyzr[4 * i + 1] = 4.0 * sin(angle) + 0.3 * cos(angle);
+        xyzr[4 * i + 2] = 3.0 * sin(angle);
+        xyzr[4 * i + 3] = 1.4;
+    }
+    ovoid_mesh *mesh = expect_atoms(*state, xyzr, RING, 0.5, &options, 0, 1);
+    assert_true(ovoid_mesh_volume(mesh) > 0.0);
+    ovoid_mesh_destroy(&mesh);
+}
+
+/* Atoms on a sphere: an outer wall and that of the cavity, whose volume counts negative. */
+static void a_hollow_shell_has_two_walls(void **state) {
+    enum { SHELL = 120 };
+    double xyzr[4 * SHELL];
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    for (size_t i = 0; i < SHELL; ++i) {
+        const double z = (2.0 * (double)i + 1.0) / SHELL - 1.0,
+                     angle = PI * (3.0 - sqrt(5.0)) * (double)i;
+        xyzr[4 * i] = 5.0 * sqrt(1.0 - z * z) * cos(angle);
+        xyzr[4 * i + 1] = 5.0 * sqrt(1.0 - z * z) * sin(angle);
+        xyzr[4 * i + 2] = 5.0 * z;
+        xyzr[4 * i + 3] = 1.2;
+    }
+    ovoid_mesh *mesh = expect_atoms(*state, xyzr, SHELL, 0.7, &options, 4, 2);
+    const ovoid_component *const a = ovoid_mesh_component(mesh, 0), *const b = ovoid_mesh_component(
+                                                                        mesh, 1);
+    assert_true(a->outer != b->outer);
+    assert_true(a->volume * b->volume < 0.0 && ovoid_mesh_volume(mesh) > 0.0);
+    ovoid_mesh_destroy(&mesh);
+}
+
+static void flat_and_thin_models_stay_closed(void **state) {
+    const model_kind kinds[] = {MODEL_NEEDLE, MODEL_PANCAKE, MODEL_RANDOM};
+    const double isovalue = 0.3;
+    for (size_t n = 0; n < 3; ++n) {
+        test_random random = {7 + n};
+        ovoid_ellipsoid ellipsoids[12];
+        ovoid_model *model = NULL;
+        ovoid_mesh *mesh = NULL;
+        const double spacing = (kinds[n] == MODEL_PANCAKE ? 1.2 : 0.5) * (test_small() ? 3.0 : 1.0);
+        const ovoid_mesh_options options = options_of(isovalue, spacing, OVOID_VERTEX_EXACT);
+        random_ellipsoids(&random, kinds[n], 4.0, ellipsoids, 12);
+        test_check(*state, ovoid_model_create(*state, ellipsoids, 12, 0.5, 1.0, &model));
+        test_check(*state, ovoid_model_mesh(*state, model, &options, &mesh));
+        print_message("%s: %zu vertices, %zu components\n", model_kind_name(kinds[n]),
+                      ovoid_mesh_vertices(mesh), ovoid_mesh_components(mesh));
+        expect_closed(mesh);
+        ovoid_mesh_destroy(&mesh);
+        ovoid_model_destroy(&model);
+    }
+}
+
+/* The gradient vanishes between two atoms, and the isovalue is phi there. */
+static void a_vertex_without_gradient_has_a_normal(void **state) {
+    const double xyzr[8] = {-1.75, 0.0, 0.0, 1.5, 1.75, 0.0, 0.0, 1.5}, origin[3] = {0};
+    double c;
+    ovoid_molecule *molecule = NULL;
+    ovoid_mesh *mesh = NULL;
+    test_check(*state, ovoid_molecule_create(*state, xyzr, 2, &molecule));
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, origin, 1, &c, NULL));
+    for (int rule = 0; rule < 2; ++rule) {
+        const ovoid_mesh_options options = options_of(c, 0.5, (ovoid_vertex_rule)rule);
+        size_t at_origin = 0;
+        test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
+        expect_closed(mesh);
+        for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
+            const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
+            const float *const n = ovoid_mesh_normals(mesh) + 3 * v;
+            at_origin += y[0] == 0.0 && y[1] == 0.0 && y[2] == 0.0;
+            expect_near((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2], 1.0, 1e-5,
+                        "a normal's square");
+        }
+        print_message("%zu vertices at the saddle\n", at_origin);
+        assert_true(at_origin > 0);
+        ovoid_mesh_destroy(&mesh);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- against the twin --------------------------------------------------------------------- */
+
+/* Small sharp atoms in a box: every case of the table comes up. */
+static ov_body *noise(test_random *random, size_t count, double half, ov_quadric **quadrics) {
+    ov_body *const bodies = test_alloc(count, sizeof *bodies);
+    *quadrics = test_alloc(count, sizeof **quadrics);
+    for (size_t i = 0; i < count; ++i) {
+        double xyzr[4];
+        for (int k = 0; k < 3; ++k)
+            xyzr[k] = random_uniform(random, -half, half);
+        xyzr[3] = random_uniform(random, 0.2, 0.5);
+        ov_body_of_atom(xyzr, 6.0, &bodies[i]);
+        (*quadrics)[i] = bodies[i].quadric;
+    }
+    return bodies;
+}
+
+static int compare_triangles(const void *a, const void *b) {
+    return memcmp(a, b, 3 * sizeof(uint32_t));
+}
+
+/* Triangles begin with their smallest corner and are sorted. */
+static void sort_triangles(uint32_t *corner, size_t triangles) {
+    for (uint32_t *t = corner; t < corner + 3 * triangles; t += 3)
+        while (t[0] > t[1] || t[0] > t[2]) {
+            const uint32_t first = t[0];
+            t[0] = t[1];
+            t[1] = t[2];
+            t[2] = first;
+        }
+    qsort(corner, triangles, 3 * sizeof *corner, compare_triangles);
+}
+
+static void expect_same(const ovoid_mesh *mesh, reference_mesh *wanted, double accuracy) {
+    const size_t triangles = ovoid_mesh_triangles(mesh), vertices = ovoid_mesh_vertices(mesh);
+    assert_int_equal(vertices, wanted->vertices);
+    assert_int_equal(triangles, wanted->triangles);
+    uint32_t *const name = test_alloc(vertices, sizeof *name), *const corner = test_alloc(
+                                                                   3 * triangles, sizeof *corner);
+    bool *const taken = test_alloc(vertices, sizeof *taken);
+    for (size_t v = 0; v < vertices; ++v) {
+        int64_t low[3];
+        size_t point = 0;
+        const unsigned axis = edge_of(mesh, v, wanted->spacing, low);
+        for (int k = 2; k >= 0; --k) {
+            assert_true(low[k] >= wanted->low[k]);
+            assert_true((size_t)(low[k] - wanted->low[k]) < wanted->size[k]);
+            point = point * wanted->size[k] + (size_t)(low[k] - wanted->low[k]);
+        }
+        name[v] = wanted->vertex[3 * point + axis];
+        assert_true(name[v] != REFERENCE_NO_VERTEX);
+        assert_false(taken[name[v]]);
+        taken[name[v]] = true;
+        expect_near(ovoid_mesh_xyz(mesh)[3 * v + axis], wanted->xyz[3 * (size_t)name[v] + axis],
+                    accuracy * (1.0 + wanted->softness[name[v]]), "a vertex");
+    }
+    for (size_t k = 0; k < 3 * triangles; ++k)
+        corner[k] = name[ovoid_mesh_corners(mesh)[k]];
+    sort_triangles(corner, triangles);
+    sort_triangles(wanted->corner, triangles);
+    assert_memory_equal(corner, wanted->corner, 3 * triangles * sizeof *corner);
+    free(name);
+    free(corner);
+    free(taken);
+}
+
+/* Linear vertices in one piece and in many: the twin's mesh. */
+static void pieces_give_the_plain_mesh(void **state) {
+    static const uint64_t limits[][3] = {OV_MARCH_PIECE, {16, 8, 8}, {8, 16, 24}, {4, 2, 2}};
+    const double spacing = 0.4, half = test_small() ? 1.6 : 4.0;
+    const size_t count = test_size(500, 40), box = test_size(31, 19);
+    const int64_t low = -(int64_t)box / 2;
+    test_random random = {11};
+    ov_quadric *quadrics;
+    ov_body *const bodies = noise(&random, count, half, &quadrics);
+    const ovoid_mesh_options options = options_of(1.0, spacing, OVOID_VERTEX_LINEAR);
+    reference_mesh wanted;
+    reference_march(quadrics, count, 1.0, spacing, (const int64_t[3]){low, low, low},
+                    (const size_t[3]){box, box, box}, &wanted);
+    for (size_t k = 0; k < sizeof limits / sizeof limits[0]; ++k) {
+        ovoid_mesh *mesh = NULL;
+        if (test_small() && k == 3)
+            break;
+        test_check(*state, ov_march(*state, bodies, count, &options, limits[k], &mesh));
+        print_message("%zu vertices, %zu triangles, %zu components\n", ovoid_mesh_vertices(mesh),
+                      ovoid_mesh_triangles(mesh), ovoid_mesh_components(mesh));
+        expect_closed(mesh);
+        expect_same(mesh, &wanted, 1e-5);
+        ovoid_mesh_destroy(&mesh);
+    }
+    reference_mesh_destroy(&wanted);
+    free(bodies);
+    free(quadrics);
+}
+
+/* Both rules give the same edges, in every case of the table and across many pieces. */
+static void exact_vertices_stay_on_their_edges(void **state) {
+    static const uint64_t limit[3] = {12, 12, 12};
+    const size_t count = test_size(900, 40);
+    test_random random = {12};
+    ov_quadric *quadrics;
+    ov_body *const bodies = noise(&random, count, test_small() ? 1.6 : 5.0, &quadrics);
+    const ovoid_mesh_options exact = options_of(0.9, 0.37, OVOID_VERTEX_EXACT),
+                             linear = options_of(0.9, 0.37, OVOID_VERTEX_LINEAR);
+    ovoid_mesh *mesh = NULL, *other = NULL;
+    test_check(*state, ov_march(*state, bodies, count, &exact, limit, &mesh));
+    test_check(*state, ov_march(*state, bodies, count, &linear, limit, &other));
+    assert_int_equal(expect_surface(mesh, quadrics, count, &exact), expect_closed(other));
+    assert_int_equal(ovoid_mesh_vertices(mesh), ovoid_mesh_vertices(other));
+    for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v)
+        for (int k = 0; k < 3; ++k)
+            assert_true(fabs(ovoid_mesh_xyz(mesh)[3 * v + (size_t)k] -
+                             ovoid_mesh_xyz(other)[3 * v + (size_t)k]) <= 0.37 + 1e-9);
+    ovoid_mesh_destroy(&mesh);
+    ovoid_mesh_destroy(&other);
+    free(bodies);
+    free(quadrics);
+}
+
+/* ---- lattices ----------------------------------------------------------------------------- */
+
+/* phi is c at many lattice points: a cube of atoms at lattice points. */
+static void values_equal_to_the_isovalue_are_inside(void **state) {
+    double xyzr[4 * 8];
+    for (size_t i = 0; i < 8; ++i) {
+        for (size_t k = 0; k < 3; ++k)
+            xyzr[4 * i + k] = i >> k & 1 ? 8.0 : 0.0;
+        xyzr[4 * i + 3] = 2.0;
+    }
+    for (int rule = 0; rule < 2; ++rule) {
+        const ovoid_mesh_options options = options_of(1.0, 1.0, (ovoid_vertex_rule)rule);
+        ovoid_mesh *mesh = mesh_atoms(*state, xyzr, 8, 0.5, &options);
+        assert_int_equal(expect_closed(mesh), 16);
+        assert_int_equal(ovoid_mesh_components(mesh), 8);
+        double low = INFINITY, high = -INFINITY;
+        for (size_t k = 0; k < 3 * ovoid_mesh_vertices(mesh); ++k) {
+            low = fmin(low, ovoid_mesh_xyz(mesh)[k]);
+            high = fmax(high, ovoid_mesh_xyz(mesh)[k]);
+        }
+        expect_near(low, -2.0, 1e-5, "the lowest vertex");
+        expect_near(high, 10.0, 1e-5, "the highest vertex");
+        ovoid_mesh_destroy(&mesh);
+    }
+}
+
+/* A mesh does not change with the lattice indices of where it lies. */
+static void far_from_the_origin(void **state) {
+    test_random random = {13};
+    const double far[3] = {40000.0, -90000.0, 262144.0};
+    double here[4 * 10], there[4 * 10];
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    for (size_t k = 0; k < 40; ++k) {
+        here[k] = k % 4 == 3 ? 1.5 : round(random_uniform(&random, -40.0, 40.0)) / 8.0;
+        there[k] = k % 4 == 3 ? here[k] : here[k] + far[k % 4];
+    }
+    ovoid_mesh *a = mesh_atoms(*state, here, 10, 0.5, &options),
+               *b = mesh_atoms(*state, there, 10, 0.5, &options);
+    assert_int_equal(ovoid_mesh_vertices(a), ovoid_mesh_vertices(b));
+    assert_int_equal(ovoid_mesh_triangles(a), ovoid_mesh_triangles(b));
+    for (size_t k = 0; k < 3 * ovoid_mesh_vertices(a); ++k)
+        expect_near(ovoid_mesh_xyz(b)[k] - far[k % 3], ovoid_mesh_xyz(a)[k], 1e-9, "a vertex");
+    ovoid_mesh_destroy(&a);
+    ovoid_mesh_destroy(&b);
+}
+
+/* A box of 1e17 lattice points; what is evaluated follows the two atoms. */
+static void memory_follows_the_surface(void **state) {
+    const double xyzr[8] = {0.0, 0.0, 0.0, 1.5, 2e5, -3e5, 4e5, 1.5};
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    ovoid_mesh *mesh = expect_atoms(*state, xyzr, 2, 0.5, &options, 4, 2);
+    ovoid_mesh_destroy(&mesh);
+}
+
+static void two_runs_are_the_same(void **state) {
+    const size_t count = test_size(600, 40);
+    const ovoid_mesh_options options = options_of(1.0, 0.4, OVOID_VERTEX_EXACT);
+    static const uint64_t limit[3] = {32, 32, 32};
+    test_random random = {14};
+    ov_quadric *quadrics;
+    ov_body *const bodies = noise(&random, count, test_small() ? 1.6 : 5.0, &quadrics);
+    ovoid_mesh *a = NULL, *b = NULL;
+    test_check(*state, ov_march(*state, bodies, count, &options, limit, &a));
+    test_check(*state, ov_march(*state, bodies, count, &options, limit, &b));
+    const size_t vertices = ovoid_mesh_vertices(a), triangles = ovoid_mesh_triangles(a);
+    assert_int_equal(vertices, ovoid_mesh_vertices(b));
+    assert_int_equal(triangles, ovoid_mesh_triangles(b));
+    assert_memory_equal(ovoid_mesh_xyz(a), ovoid_mesh_xyz(b), 3 * vertices * sizeof(double));
+    assert_memory_equal(ovoid_mesh_normals(a), ovoid_mesh_normals(b), 3 * vertices * sizeof(float));
+    assert_memory_equal(ovoid_mesh_corners(a), ovoid_mesh_corners(b),
+                        3 * triangles * sizeof(uint32_t));
+    ovoid_mesh_destroy(&a);
+    ovoid_mesh_destroy(&b);
+    free(bodies);
+    free(quadrics);
+}
+
+/* ---- a protein ---------------------------------------------------------------------------- */
+
+static bool file_exists(const char *path) {
+    FILE *const file = fopen(path, "rb");
+    if (file)
+        fclose(file);
+    return file != NULL;
+}
+
+static void a_protein_is_closed(void **state) {
+    ovoid_molecule *molecule = NULL;
+    if (test_small() || !file_exists(APBS_FAS2)) {
+        print_message("no " APBS_FAS2 ", or small tests; install apbs-data\n");
+        skip();
+    }
+    test_check(*state, ovoid_molecule_read(*state, APBS_FAS2, OVOID_MOLECULE_AUTO, &molecule));
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    ov_quadric *const quadrics = quadrics_of(ovoid_molecule_xyzr(molecule), atoms, 0.5);
+    static const uint64_t limit[3] = {40, 40, 40};
+    ov_body *const bodies = test_alloc(atoms, sizeof *bodies);
+    for (size_t i = 0; i < atoms; ++i)
+        ov_body_of_atom(ovoid_molecule_xyzr(molecule) + 4 * i, 0.5, &bodies[i]);
+    for (int rule = 0; rule < 2; ++rule) {
+        const ovoid_mesh_options options = options_of(1.0, 0.5, (ovoid_vertex_rule)rule);
+        ovoid_mesh *one = NULL, *many = NULL;
+        test_check(*state, ov_march(*state, bodies, atoms, &options, whole, &one));
+        test_check(*state, ov_march(*state, bodies, atoms, &options, limit, &many));
+        const int64_t euler = expect_surface(one, quadrics, atoms, &options);
+        assert_int_equal(expect_closed(many), euler);
+        assert_int_equal(ovoid_mesh_vertices(one), ovoid_mesh_vertices(many));
+        assert_int_equal(ovoid_mesh_components(one), ovoid_mesh_components(many));
+        expect_near(ovoid_mesh_volume(many), ovoid_mesh_volume(one), 1e-6 * ovoid_mesh_volume(one),
+                    "volume");
+        expect_near(ovoid_mesh_area(many), ovoid_mesh_area(one), 1e-6 * ovoid_mesh_area(one),
+                    "area");
+        assert_true(ovoid_mesh_volume(one) > 0.0);
+        ovoid_mesh_destroy(&one);
+        ovoid_mesh_destroy(&many);
+    }
+    free(quadrics);
+    free(bodies);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- refusals ----------------------------------------------------------------------------- */
+
+static void refusals(void **state) {
+    const double xyzr[4] = {0.2, 0.1, 0.3, 1.5};
+    ovoid_molecule *molecule = NULL;
+    ovoid_model *model = NULL;
+    ovoid_mesh *mesh = NULL;
+    const ovoid_ellipsoid huge = {.amplitude = 1e200, .decay = {1.0, 1.0, 1.0}};
+    ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    test_check(*state, ovoid_molecule_create(*state, xyzr, 1, &molecule));
+    test_check(*state, ovoid_model_create(*state, &huge, 1, 0.5, 1.0, &model));
+    ovoid_mesh_options_init(NULL);
+    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, NULL, &mesh),
+                 OVOID_ERROR_ARGUMENT, "NULL");
+    test_refused(*state, ovoid_model_mesh(*state, NULL, &options, &mesh), OVOID_ERROR_ARGUMENT,
+                 "NULL");
+    test_refused(*state, ovoid_molecule_mesh(*state, molecule, -0.5, &options, &mesh),
+                 OVOID_ERROR_ARGUMENT, "decay");
+    const double bad[] = {0.0, -1.0, NAN, INFINITY};
+    for (size_t k = 0; k < 4; ++k) {
+        options = options_of(bad[k], 0.5, OVOID_VERTEX_EXACT);
+        test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                     OVOID_ERROR_ARGUMENT, "isovalue");
+        options = options_of(1.0, bad[k], OVOID_VERTEX_EXACT);
+        test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                     OVOID_ERROR_ARGUMENT, "spacing");
+    }
+    options = options_of(1.0, 0.5, (ovoid_vertex_rule)7);
+    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                 OVOID_ERROR_ARGUMENT, "vertex rule");
+    options = options_of(50.0, 0.5, OVOID_VERTEX_EXACT);
+    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                 OVOID_ERROR_EMPTY, "below the isovalue 50 everywhere");
+    options = options_of(3.0, 100.0, OVOID_VERTEX_EXACT);
+    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                 OVOID_ERROR_EMPTY, "largest value of the field at a lattice point is 2.87");
+    const double spacings[] = {1e-5, 1e-9, 1e-300};
+    for (size_t k = 0; k < 3; ++k) {
+        options = options_of(1.0, spacings[k], OVOID_VERTEX_EXACT);
+        test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                     OVOID_ERROR_LIMIT, "spacing");
+    }
+    options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    test_refused(*state, ovoid_model_mesh(*state, model, &options, &mesh), OVOID_ERROR_NUMERIC,
+                 "ellipsoid 1 is degenerate");
+    assert_null(mesh);
+    ovoid_molecule_destroy(&molecule);
+    ovoid_model_destroy(&model);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(loops_are_closed_and_face_outward),
+        cmocka_unit_test(triangles_fill_the_loops),
+        cmocka_unit_test(neighbours_agree_on_their_face),
+        cmocka_unit_test(one_atom_is_a_sphere),
+        cmocka_unit_test(spheres_and_ellipsoids_have_their_measures),
+        cmocka_unit_test(two_spheres),
+        cmocka_unit_test(a_ring_has_a_hole),
+        cmocka_unit_test(a_hollow_shell_has_two_walls),
+        cmocka_unit_test(flat_and_thin_models_stay_closed),
+        cmocka_unit_test(a_vertex_without_gradient_has_a_normal),
+        cmocka_unit_test(pieces_give_the_plain_mesh),
+        cmocka_unit_test(exact_vertices_stay_on_their_edges),
+        cmocka_unit_test(values_equal_to_the_isovalue_are_inside),
+        cmocka_unit_test(far_from_the_origin),
+        cmocka_unit_test(memory_follows_the_surface),
+        cmocka_unit_test(two_runs_are_the_same),
+        cmocka_unit_test(a_protein_is_closed),
+        cmocka_unit_test(refusals),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

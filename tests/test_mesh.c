@@ -1,0 +1,270 @@
+/*
+ * Meshes: what they say of themselves, against closed forms.
+ */
+#include "shapes.h"
+#include "support.h"
+
+#define PI 3.14159265358979323846
+
+static int make_context(void **state) {
+    ovoid_context *context = NULL;
+    if (ovoid_context_create(&context) != OVOID_OK)
+        return -1;
+    *state = context;
+    return 0;
+}
+
+static void test_tetrahedron(void **state) {
+    static const double xyz[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+    static const uint32_t corners[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    ovoid_mesh *mesh = NULL;
+    test_check(*state, ovoid_mesh_create(*state, xyz, NULL, 4, corners, 4, &mesh));
+    assert_int_equal(ovoid_mesh_vertices(mesh), 4);
+    assert_int_equal(ovoid_mesh_triangles(mesh), 4);
+    assert_int_equal(ovoid_mesh_components(mesh), 1);
+    const ovoid_component *const only = ovoid_mesh_component(mesh, 0);
+    assert_null(ovoid_mesh_component(mesh, 1));
+    assert_true(only->closed && only->outer);
+    assert_int_equal(only->euler, 2);
+    assert_int_equal(only->vertices, 4);
+    assert_int_equal(only->triangles, 4);
+    expect_near(ovoid_mesh_volume(mesh), 1.0 / 6.0, 1e-15, "volume");
+    expect_near(ovoid_mesh_area(mesh), 1.5 + 0.5 * sqrt(3.0), 1e-15, "area");
+    /* The normal at the origin is the mean of those of three faces of equal area. */
+    for (size_t k = 0; k < 3; ++k)
+        expect_near(ovoid_mesh_normals(mesh)[k], -1.0 / sqrt(3.0), 1e-7, "normal");
+    assert_memory_equal(ovoid_mesh_xyz(mesh), xyz, sizeof xyz);
+    assert_memory_equal(ovoid_mesh_corners(mesh), corners, sizeof corners);
+    ovoid_mesh_destroy(&mesh);
+    assert_null(mesh);
+    ovoid_mesh_destroy(&mesh);
+    ovoid_mesh_destroy(NULL);
+}
+
+/* Edges that are missing, double or turned are seen. */
+static void test_defects(void **state) {
+    shape s = {0};
+    shape_add_sphere(&s, 2, 2.0, 0, 0, 0);
+    ovoid_mesh *mesh = shape_mesh(*state, &s);
+    assert_true(ovoid_mesh_component(mesh, 0)->closed);
+    ovoid_mesh_destroy(&mesh);
+
+    s.triangles--; /* a hole */
+    mesh = shape_mesh(*state, &s);
+    assert_false(ovoid_mesh_component(mesh, 0)->closed);
+    assert_int_equal(ovoid_mesh_component(mesh, 0)->euler, 1);
+    ovoid_mesh_destroy(&mesh);
+    s.triangles++;
+
+    uint32_t *const last = s.corners + 3 * (s.triangles - 1);
+    const uint32_t kept[3] = {last[0], last[1], last[2]};
+    last[1] = kept[2]; /* turned */
+    last[2] = kept[1];
+    mesh = shape_mesh(*state, &s);
+    assert_false(ovoid_mesh_component(mesh, 0)->closed);
+    assert_int_equal(ovoid_mesh_component(mesh, 0)->euler, 2);
+    ovoid_mesh_destroy(&mesh);
+
+    memcpy(last, s.corners, 3 * sizeof *last); /* double, and a hole */
+    mesh = shape_mesh(*state, &s);
+    assert_false(ovoid_mesh_component(mesh, 0)->closed);
+    ovoid_mesh_destroy(&mesh);
+    shape_destroy(&s);
+}
+
+/* A ball with a cavity, a torus beside it, and a vertex that nobody uses. */
+static void test_components(void **state) {
+    shape s = {0};
+    shape_add_sphere(&s, 3, 3.0, 10, 0, 0);
+    shape_add_ellipsoid(&s, 3, (const double[3]){1, 1, 1}, (const double[3]){10, 0, 0}, true);
+    shape_add_torus(&s, 24, 4.0, 1.0);
+    const size_t used = s.vertices;
+    const double point[3] = {7, 7, 7};
+    s.xyz = realloc(s.xyz, (3 * used + 3) * sizeof *s.xyz);
+    s.normals = realloc(s.normals, (3 * used + 3) * sizeof *s.normals);
+    memcpy(s.xyz + 3 * used, point, sizeof point);
+    s.normals[3 * used] = s.normals[3 * used + 1] = 0.0f;
+    s.normals[3 * used + 2] = 1.0f;
+    s.vertices++;
+    ovoid_mesh *mesh = shape_mesh(*state, &s);
+    assert_int_equal(ovoid_mesh_components(mesh), 4);
+    static const int euler[4] = {2, 2, 0, 1};
+    static const bool outer[4] = {true, false, true, false}, closed[4] = {true, true, true, false};
+    double area = 0.0, volume = 0.0;
+    size_t vertices = 0;
+    for (size_t c = 0; c < 4; ++c) {
+        const ovoid_component *const component = ovoid_mesh_component(mesh, c);
+        assert_int_equal(component->euler, euler[c]);
+        assert_int_equal(component->outer, outer[c]);
+        assert_int_equal(component->closed, closed[c]);
+        area += component->area;
+        volume += component->volume;
+        for (size_t v = 0; v < component->vertices; ++v)
+            assert_int_equal(ovoid_mesh_component_of(mesh)[vertices + v], c);
+        vertices += component->vertices;
+    }
+    assert_int_equal(vertices, s.vertices);
+    assert_true(ovoid_mesh_component(mesh, 1)->volume < 0.0);
+    expect_near(ovoid_mesh_area(mesh), area, 1e-9, "area");
+    expect_near(ovoid_mesh_volume(mesh), volume, 1e-9, "volume");
+    expect_near(ov_mesh_flat(mesh, true).volume - volume, -ovoid_mesh_component(mesh, 1)->volume,
+                1e-9, "volume of the cavity");
+    const double wall = ov_mesh_smooth(mesh, false).area - ov_mesh_smooth(mesh, true).area;
+    expect_near(wall, 4.0 * PI, 0.002, "area of the cavity's wall");
+    ovoid_mesh_destroy(&mesh);
+    shape_destroy(&s);
+}
+
+/* The order in which the error falls when triangles are halved, and the last error. */
+typedef struct order {
+    double area, volume, last_area, last_volume;
+} order;
+
+typedef void add_level(shape *s, int level);
+
+static order convergence(ovoid_context *context, add_level *add, int from, double area,
+                         double volume, bool smooth) {
+    ov_content error[2];
+    for (int k = 0; k < 2; ++k) {
+        shape s = {0};
+        add(&s, from + k);
+        ovoid_mesh *mesh = shape_mesh(context, &s);
+        error[k].area =
+            fabs((smooth ? ovoid_mesh_smooth_area(mesh) : ovoid_mesh_area(mesh)) / area - 1.0);
+        error[k].volume = fabs(
+            (smooth ? ovoid_mesh_smooth_volume(mesh) : ovoid_mesh_volume(mesh)) / volume - 1.0);
+        ovoid_mesh_destroy(&mesh);
+        shape_destroy(&s);
+    }
+    return (order){log2(error[0].area / error[1].area), log2(error[0].volume / error[1].volume),
+                   error[1].area, error[1].volume};
+}
+
+static void add_sphere(shape *s, int level) {
+    shape_add_sphere(s, level, 2.0, 30.0, -20.0, 10.0);
+}
+
+static const double axes[3] = {1.5, 2.0, 3.0};
+static void add_ellipsoid(shape *s, int level) {
+    shape_add_ellipsoid(s, level, axes, (const double[3]){30.0, -20.0, 10.0}, false);
+}
+
+static void add_torus(shape *s, int level) {
+    shape_add_torus(s, (size_t)4 << level, 4.0, 1.0);
+}
+
+static void expect_orders(const char *what, order flat, order smooth) {
+    print_message("%s: flat of order %.2f, %.2f (errors %.2g, %.2g), smooth %.2f, %.2f (%.2g, "
+                  "%.2g)\n",
+                  what, flat.area, flat.volume, flat.last_area, flat.last_volume, smooth.area,
+                  smooth.volume, smooth.last_area, smooth.last_volume);
+    expect_near(flat.area, 2.0, 0.1, "order of the flat area");
+    expect_near(flat.volume, 2.0, 0.1, "order of the flat volume");
+    expect_near(smooth.area, 4.0, 0.4, "order of the smooth area");
+    expect_near(smooth.volume, 4.0, 0.4, "order of the smooth volume");
+}
+
+static void test_orders(void **state) {
+    const double ball = 4.0 / 3.0 * PI;
+    const double area = ellipsoid_area(axes);
+    expect_near(ellipsoid_area((const double[3]){2, 2, 2}), 16.0 * PI, 1e-5, "quadrature");
+    expect_orders("sphere", convergence(*state, add_sphere, 2, 16.0 * PI, 8.0 * ball, false),
+                  convergence(*state, add_sphere, 2, 16.0 * PI, 8.0 * ball, true));
+    expect_orders("ellipsoid", convergence(*state, add_ellipsoid, 3, area, 9.0 * ball, false),
+                  convergence(*state, add_ellipsoid, 3, area, 9.0 * ball, true));
+    const double torus_area = 16.0 * PI * PI, torus_volume = 8.0 * PI * PI;
+    expect_orders("torus", convergence(*state, add_torus, 3, torus_area, torus_volume, false),
+                  convergence(*state, add_torus, 3, torus_area, torus_volume, true));
+}
+
+static void test_flat_surface_stays_flat(void **state) {
+    shape s = {0};
+    shape_add_square(&s, 5, 2.0, 3.0);
+    ovoid_mesh *mesh = shape_mesh(*state, &s);
+    expect_near(ovoid_mesh_area(mesh), 16.0, 1e-12, "area");
+    expect_near(ovoid_mesh_smooth_area(mesh), 16.0, 1e-12, "smooth area");
+    assert_false(ovoid_mesh_component(mesh, 0)->closed);
+    ovoid_mesh_destroy(&mesh);
+    shape_destroy(&s);
+}
+
+/* Every triangle of a sphere cut at a point next to the middle of an edge: needles whose planes are
+ * far from the surface, as marching cubes makes them. */
+static void test_needles(void **state) {
+    shape s = {0};
+    shape_add_sphere(&s, 4, 2.0, 0, 0, 0);
+    const size_t before = s.triangles;
+    shape cut = {0};
+    const size_t vertices = s.vertices + before;
+    cut.xyz = test_alloc(3 * vertices, sizeof *cut.xyz);
+    cut.normals = test_alloc(3 * vertices, sizeof *cut.normals);
+    cut.corners = test_alloc(9 * before, sizeof *cut.corners);
+    memcpy(cut.xyz, s.xyz, 3 * s.vertices * sizeof *s.xyz);
+    memcpy(cut.normals, s.normals, 3 * s.vertices * sizeof *s.normals);
+    cut.vertices = s.vertices;
+    for (size_t t = 0; t < before; ++t) {
+        const uint32_t *const c = s.corners + 3 * t;
+        double x[3], length = 0.0;
+        for (size_t k = 0; k < 3; ++k) {
+            x[k] = 0.498 * s.xyz[3 * c[0] + k] + 0.498 * s.xyz[3 * c[1] + k] +
+                   0.004 * s.xyz[3 * c[2] + k];
+            length += x[k] * x[k];
+        }
+        for (size_t k = 0; k < 3; ++k) {
+            cut.xyz[3 * cut.vertices + k] = 2.0 * x[k] / sqrt(length);
+            cut.normals[3 * cut.vertices + k] = (float)(x[k] / sqrt(length));
+        }
+        const uint32_t at = (uint32_t)cut.vertices++;
+        for (size_t k = 0; k < 3; ++k, ++cut.triangles) {
+            cut.corners[3 * cut.triangles] = c[k];
+            cut.corners[3 * cut.triangles + 1] = c[(k + 1) % 3];
+            cut.corners[3 * cut.triangles + 2] = at;
+        }
+    }
+    ovoid_mesh *mesh = shape_mesh(*state, &cut);
+    print_message("needles: flat area off by %.2g, smooth by %.2g\n",
+                  ovoid_mesh_area(mesh) / (16.0 * PI) - 1.0,
+                  ovoid_mesh_smooth_area(mesh) / (16.0 * PI) - 1.0);
+    expect_near(ovoid_mesh_smooth_area(mesh) / (16.0 * PI), 1.0, 2e-5, "smooth area");
+    expect_near(ovoid_mesh_smooth_volume(mesh) / (32.0 / 3.0 * PI), 1.0, 2e-5, "smooth volume");
+    ovoid_mesh_destroy(&mesh);
+    shape_destroy(&cut);
+    shape_destroy(&s);
+}
+
+static void test_refusals(void **state) {
+    static const double xyz[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    static const double bad[9] = {0, 0, 0, 1, NAN, 0, 0, 1, 0};
+    static const float tilt[9] = {0, 0, 1, 0, 0, INFINITY, 0, 0, 1};
+    static const uint32_t good[3] = {0, 1, 2}, past[3] = {0, 1, 3};
+    ovoid_mesh *mesh = NULL;
+    ovoid_context *const context = *state;
+    test_refused(context, ovoid_mesh_create(context, xyz, NULL, 3, past, 1, &mesh),
+                 OVOID_ERROR_ARGUMENT, "triangle 0 of a mesh names vertex 3, but there are 3");
+    test_refused(context, ovoid_mesh_create(context, bad, NULL, 3, good, 1, &mesh),
+                 OVOID_ERROR_ARGUMENT, "vertex 1 of a mesh");
+    test_refused(context, ovoid_mesh_create(context, xyz, tilt, 3, good, 1, &mesh),
+                 OVOID_ERROR_ARGUMENT, "vertex 1 of a mesh");
+    test_refused(context, ovoid_mesh_create(context, NULL, NULL, 3, good, 1, &mesh),
+                 OVOID_ERROR_ARGUMENT, "arrays");
+    test_refused(context, ovoid_mesh_create(context, xyz, NULL, SIZE_MAX / 2, good, 1, &mesh),
+                 OVOID_ERROR_LIMIT, "vertices");
+    assert_null(mesh);
+    test_check(context, ovoid_mesh_create(context, NULL, NULL, 0, NULL, 0, &mesh));
+    assert_int_equal(ovoid_mesh_components(mesh), 0);
+    expect_near(ovoid_mesh_smooth_area(mesh), 0.0, 0.0, "area of nothing");
+    ovoid_mesh_destroy(&mesh);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_tetrahedron),
+        cmocka_unit_test(test_defects),
+        cmocka_unit_test(test_components),
+        cmocka_unit_test(test_orders),
+        cmocka_unit_test(test_flat_surface_stays_flat),
+        cmocka_unit_test(test_needles),
+        cmocka_unit_test(test_refusals),
+    };
+    return cmocka_run_group_tests(tests, make_context, test_close);
+}

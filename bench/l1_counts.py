@@ -5,8 +5,8 @@
                  [--sweep] [--output bench/results/l1_counts.csv]
 
 Fits every molecule of Table 1 that DIR holds as NAME.pqr (or NAME.pqr.gz) with the defaults, prints a
-table and writes a CSV. --sweep repeats it for several spacings and paddings. Fits run one after
-another; run nothing else beside them where the seconds matter.
+table and writes a CSV. --sweep repeats it for several spacings and paddings, and leaves the times out
+of the CSV. Fits run one after another; run nothing else beside them where the seconds matter.
 """
 
 import argparse
@@ -19,12 +19,15 @@ import sys
 import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-SPACINGS = (0.7, 0.8, 0.9, 1.0, 1.25)
-PADDINGS = (1.0, 1.5, 2.0, 3.0)
-COLUMNS = (
+SPACINGS = (0.7, 0.8, 1.0, 1.25)
+PADDINGS = (2.0, 3.0, 4.0)
+COUNTS = (
     "molecule atoms ellipsoids paper sparse_ratio spacing padding points rms_error max_error "
-    "iterations seconds lists_seconds field_seconds moments_seconds host_seconds list_builds "
-    "field_passes moments_passes launches"
+    "iterations"
+).split()
+TIMES = (
+    "seconds lists_seconds field_seconds moments_seconds host_seconds list_builds field_passes "
+    "moments_passes launches"
 ).split()
 
 
@@ -54,18 +57,18 @@ def fit(ovoid, path, options):
 
 def row_of(name, report, paper):
     row = {"molecule": name, "paper": paper, "seconds": report["seconds"]["fit"]}
-    for key in COLUMNS:
+    for key in COUNTS + TIMES:
         if key not in row:
             value = report[key] if key in report else report["profile"][key]
             row[key] = float(f"{value:.4g}") if isinstance(value, float) else value
     return row
 
 
-def write(path, device, version, rows):
+def write(path, device, version, columns, rows):
     beside = path + ".part"
     with open(beside, "w", encoding="utf-8", newline="") as out:
         out.write(f"# ovoid {version}, {device}; bench/l1_counts.py\n")
-        table = csv.DictWriter(out, COLUMNS, lineterminator="\n")
+        table = csv.DictWriter(out, columns, extrasaction="ignore", lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
     os.replace(beside, path)
@@ -102,7 +105,8 @@ def main():
                   f"{row['ellipsoids']:12}{row['paper']:7}{row['rms_error']:9.4f}"
                   f"{row['max_error']:9.3f}{row['seconds']:9.1f}", flush=True)
     if arguments.output:
-        write(arguments.output, report["device"], report["version"], rows)
+        columns = COUNTS if arguments.sweep else COUNTS + TIMES
+        write(arguments.output, report["device"], report["version"], columns, rows)
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ typedef struct ov_lane_points {
     ov_vec x[OV_VECTORS], y[OV_VECTORS], z[OV_VECTORS];
 } ov_lane_points;
 
-static inline void ov_load_points(ov_lane_points *lane_points, __global const float *points, uint pack,
-                           uint lane) {
+static inline void ov_load_points(ov_lane_points *lane_points, __global const float *points,
+                                  uint pack, uint lane) {
     __global const float *const x = points + (size_t)pack * (3 * OV_PACK);
 #pragma unroll
     for (uint v = 0; v < OV_VECTORS; ++v) {
@@ -74,7 +74,8 @@ __kernel void field_polynomial(const uint packs, __global const float *restrict 
 #pragma unroll
         for (uint v = 0; v < OV_VECTORS; ++v) {
             const ov_vec x = p.x[v] - t.x, y = p.y[v] - t.y, z = p.z[v] - t.z;
-            const ov_vec in_x = fma(z, (ov_vec)(c6), fma(y, (ov_vec)(c5), fma(x, (ov_vec)(c4), (ov_vec)(c1))));
+            const ov_vec in_x =
+                fma(z, (ov_vec)(c6), fma(y, (ov_vec)(c5), fma(x, (ov_vec)(c4), (ov_vec)(c1))));
             const ov_vec in_y = fma(z, (ov_vec)(c8), fma(y, (ov_vec)(c7), (ov_vec)(c2)));
             const ov_vec in_z = fma(z, (ov_vec)(c9), (ov_vec)(c3));
             const ov_vec factor = fma(x, in_x, fma(y, in_y, fma(z, in_z, (ov_vec)(c0))));
@@ -86,13 +87,13 @@ __kernel void field_polynomial(const uint packs, __global const float *restrict 
         OV_STORE(sum[v], v * OV_LANES + lane, value + (size_t)pack * OV_PACK);
 }
 
-/* value[k] = sum_i e_i(y_k), and its gradient in angstrom^-1: OV_PACK x, y, z components per pack, as
- * the points are stored. */
+/* value[k] = sum_i e_i(y_k), and its gradient in angstrom^-1: OV_PACK x, y, z components per pack,
+ * as the points are stored. */
 __kernel void field_gradient(const uint packs, __global const float *restrict points,
                              __global const uint *restrict start,
                              __global const uint *restrict item,
-                             __global const ov_term *restrict terms,
-                             __global float *restrict value, __global float *restrict gradient) {
+                             __global const ov_term *restrict terms, __global float *restrict value,
+                             __global float *restrict gradient) {
     const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
     if (pack >= packs)
         return;

@@ -1,10 +1,10 @@
 /*
- * Reports the sizes and offsets that this device gives to the structures of shared.h, for the host to
- * compare with its own.
+ * Reports the sizes and offsets that this device gives to the structures of shared.h, for the host
+ * to compare with its own.
  */
 
-/* The offsets are measured on an object rather than with a null pointer, which some compilers refuse
- * to fold. */
+/* The offsets are measured on an object rather than with a null pointer, which some compilers
+ * refuse to fold. */
 #define OFFSET(object, member) (uint)((const char *)&(object).member - (const char *)&(object))
 
 /* out: sizes and offsets in the order of tests/test_device.c; one work-item. */

@@ -23,7 +23,7 @@ typedef OV_JOIN(int, OV_TEST) ov_test_hit;
 
 /* -1 where the term may meet the box low..high (relative to its centre), else 0. */
 static inline ov_test_hit ov_meets(const ov_term t, ov_test lx, ov_test ly, ov_test lz, ov_test hx,
-                            ov_test hy, ov_test hz) {
+                                   ov_test hy, ov_test hz) {
     const ov_test zero = 0.0f;
     ov_test x = clamp(zero, lx, hx), y = clamp(zero, ly, hy), z = clamp(zero, lz, hz);
     const float ix = -0.5f / t.xx, iy = -0.5f / t.yy, iz = -0.5f / t.zz;
@@ -37,13 +37,14 @@ static inline ov_test_hit ov_meets(const ov_term t, ov_test lx, ov_test ly, ov_t
     const ov_test gy = fma(y, (ov_test)(2.0f * t.yy), fma(x, (ov_test)(t.xy), z * t.yz));
     const ov_test gz = fma(z, (ov_test)(2.0f * t.zz), fma(x, (ov_test)(t.xz), y * t.yz));
     const ov_test q = 0.5f * fma(x, gx, fma(y, gy, z * gz));
-    const ov_test lower = q + min(gx * (lx - x), gx * (hx - x)) + min(gy * (ly - y), gy * (hy - y)) +
-                          min(gz * (lz - z), gz * (hz - z));
+    const ov_test lower = q + min(gx * (lx - x), gx * (hx - x)) +
+                          min(gy * (ly - y), gy * (hy - y)) + min(gz * (lz - z), gz * (hz - z));
     return (lower <= t.reach) & (lx <= hx);
 }
 
 /* Tests the term against the boxes of one group; hit[j] != 0 where box j may be reached. */
-static inline void ov_test_group(const ov_term t, __global const float *group, float skin, int *hit) {
+static inline void ov_test_group(const ov_term t, __global const float *group, float skin,
+                                 int *hit) {
 #pragma unroll
     for (uint v = 0; v < OV_GROUP_VECTORS; ++v) {
         const ov_test lx = OV_TEST_LOAD(v, group) - (t.x + skin);

@@ -38,14 +38,14 @@ typedef float ov_f32;
 typedef struct ov_term {
     ov_f32 log2_amplitude;
     ov_f32 x, y, z;                /* centre */
-    ov_f32 xx, xy, xz, yy, yz, zz; /* A; the off-diagonal entries are doubled: q = xx x^2 + xy x y + ... */
+    ov_f32 xx, xy, xz, yy, yz, zz; /* A, off-diagonals doubled: q = xx x^2 + xy x y + ... */
     ov_f32 reach;                  /* largest q within the cut-off; negative: reaches nothing */
     ov_f32 padding;
 } ov_term;
 
 /* A tree of boxes over consecutive leaves: level 0 holds the leaves, each level above one box per
- * group of OV_GROUP below. Boxes are stored by group as OV_GROUP values each of low x, low y, low z,
- * high x, high y, high z; absent boxes are empty (low > high). */
+ * group of OV_GROUP below. Boxes are stored by group as OV_GROUP values each of low x, low y, low
+ * z, high x, high y, high z; absent boxes are empty (low > high). */
 typedef struct ov_tree {
     ov_u32 levels;
     ov_u32 boxes[OV_LEVELS];  /* number of boxes of a level */

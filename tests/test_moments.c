@@ -68,7 +68,7 @@ static void moments_equal_twin(void **state) {
     }
 }
 
-/* List lengths about the sizes of tiles (16 packs) and of flushes (128 packs). */
+/* List lengths about the sizes of tiles and of flushes, powers of two of packs. */
 static void moments_of_every_list_length(void **state) {
     const size_t lengths[] = {1, 2, 15, 16, 17, 31, 32, 33, 145, 255, 256, 257, 300, 513};
     const size_t count = test_size(sizeof lengths / sizeof lengths[0], 5);
@@ -84,7 +84,8 @@ static void moments_of_every_list_length(void **state) {
 }
 
 /* A broad term at coincident points sums u itself. Large parts that cancel leave the small ones
- * exactly, which one float total, or the high parts alone, would lose. */
+ * exactly, which one float total, or the high parts alone, would lose. `flush` points are a
+ * multiple of what the kernel sums in single floats. */
 static void totals_hold_two_floats(void **state) {
     const size_t flush = 256 * OV_PACK, flushes = test_size(9, 4), count = flushes * flush;
     const ov_quadric quadric = {.amplitude = 1.0, .a = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0}};

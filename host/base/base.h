@@ -12,10 +12,10 @@
 struct ov_device; /* host/device/device.h */
 
 struct ovoid_context {
-    char *error;         /* last failure, owned, may be NULL */
+    char *error; /* last failure, owned, may be NULL */
     ovoid_warning_fn warn;
     void *warn_user;
-    struct ov_device *device; /* NULL until opened */
+    struct ov_device *device;              /* NULL until opened */
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */
 };
 
@@ -37,8 +37,8 @@ ov_warn(ovoid_context *context, const char *format, ...);
  * records OVOID_ERROR_MEMORY with `what`. Free with free(). */
 void *ov_alloc(ovoid_context *context, size_t count, size_t size, const char *what);
 
-/* Grows *array to hold at least `need` elements of `size` bytes; *capacity counts elements. Growth is
- * geometric. The new part is not cleared. */
+/* Grows *array to hold at least `need` elements of `size` bytes; *capacity counts elements. Growth
+ * is geometric. The new part is not cleared. */
 ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capacity, size_t need,
                      size_t size, const char *what);
 

@@ -1,11 +1,14 @@
 #!/bin/sh
 # header.sh CC
-# The public header stands alone, in C99 and in C++.
+# Each public header stands alone, in C99 and in C++.
 set -u
 cc=$1
 check() {
-    printf '#include <ovoid/ovoid.h>\n#include <ovoid/ovoid.h>\nint main(%s) { return 0; }\n' "$2" |
-        $1 -pedantic -Wall -Wextra -Werror -fsyntax-only -Iinclude - || exit 1
+    for header in include/ovoid/*.h; do
+        name=ovoid/${header##*/}
+        printf '#include <%s>\n#include <%s>\nint main(%s) { return 0; }\n' "$name" "$name" "$2" |
+            $1 -pedantic -Wall -Wextra -Werror -fsyntax-only -Iinclude - || exit 1
+    done
 }
 check "$cc -std=c99 -x c" void
 for program in g++ c++ clang++ clang++-15 clang++-14; do

@@ -11,6 +11,7 @@ if [ -z "${clang:-}" ]; then
     echo "skipped: clang is not installed"
     exit 77
 fi
+pack=$(sed -n 's/^#define OV_PACK \([0-9]*\)$/\1/p' "$folder/shared.h")
 status=0
 found=0
 for source in "$folder"/*.cl; do
@@ -20,7 +21,7 @@ for source in "$folder"/*.cl; do
             printf '#line 1 "%s/%s"\n' "$folder" "$file"
             cat "$folder/$file"
         done | "$clang" -target spir64 -x cl -cl-std=CL1.2 -Xclang -finclude-default-header \
-            -fsyntax-only -Wall -Wno-unused-function -Werror -DOV_PACK=16 -DOV_VECTOR="${shape%x*}" \
+            -fsyntax-only -Wall -Wno-unused-function -Werror -DOV_PACK="$pack" -DOV_VECTOR="${shape%x*}" \
             -DOV_LANES="${shape#*x}" - || {
             echo "$source fails in shape $shape"
             status=1

@@ -1,12 +1,12 @@
 #!/bin/sh
 # symbols.sh LIBRARY TOOL
-# The library exports what the public header declares and nothing else, and the tool stands on the
+# The library exports what the public headers declare and nothing else, and the tool stands on the
 # library alone.
 set -eu
 library=$1
 tool=$2
 exported=$(nm -D --defined-only "$library" | awk '{print $3}' | sed 's/@.*//' | sort)
-declared=$(grep -v '^#' include/ovoid/ovoid.h | tr '\n' ' ' | grep -o 'OVOID_API [^;(]*(' |
+declared=$(cat include/ovoid/*.h | grep -v '^#' | tr '\n' ' ' | grep -o 'OVOID_API [^;(]*(' |
     sed 's/[ (]*$//; s/.*[ *]//' | sort)
 if [ "$exported" != "$declared" ]; then
     echo "Exported ('>') and declared ('<') functions differ:"

@@ -1,0 +1,449 @@
+/*
+ * The paper's Algorithm 1, step by step, seen through its progress records and checked in double:
+ * start, weights, gate, gradient step, line search, pruning, phases, end.
+ */
+#include "support.h"
+
+typedef struct trace {
+    ovoid_progress *records; /* of iterations, not of sampling */
+    size_t count, capacity;
+} trace;
+
+static bool record(const ovoid_progress *progress, void *user) {
+    trace *const t = user;
+    if (strcmp(progress->stage, "sample") == 0)
+        return true;
+    if (t->count == t->capacity) {
+        t->capacity = 2 * t->capacity + 64;
+        t->records = realloc(t->records, t->capacity * sizeof *t->records);
+        if (!t->records)
+            abort();
+    }
+    t->records[t->count++] = *progress;
+    return true;
+}
+
+/* Everything is set here, whatever the defaults are. */
+static ovoid_fit_options options_for(trace *t, uint32_t sparse_iterations, uint32_t iterations) {
+    const ovoid_fit_options options = {
+        .method = OVOID_METHOD_L1,
+        .decay = 0.5,
+        .isovalue = 1.0,
+        .spacing = test_size(80, 180) / 100.0,
+        .padding = 2.0,
+        .l1 = {.iterations = iterations,
+               .sparse_iterations = sparse_iterations,
+               .epsilon = 0.05,
+               .max_error = 0.5,
+               .prune_below = 1e-3,
+               .prune_every = 20,
+               .first_step = OVOID_FIRST_STEP_SECANT,
+               .armijo = 1e-4,
+               .shrink = 0.5,
+               .grow = 2.0,
+               .max_backtracks = 30},
+        .progress = record,
+        .user = t,
+    };
+    return options;
+}
+
+/* A small clump of atoms. */
+enum { ATOMS = 6 };
+static const double clump[4 * ATOMS] = {
+    10.0, -5.0, 3.0, 1.7,  11.2, -4.3, 3.5, 1.2, 9.1,  -4.2, 2.4, 1.55,
+    9.6,  -6.1, 3.9, 1.52, 10.8, -5.9, 1.9, 1.1, 12.0, -5.4, 4.4, 1.0,
+};
+
+/* One fit, all of it. Destroy with destroy_run(). */
+typedef struct fit_run {
+    trace trace;
+    ovoid_model *model;
+    ovoid_fit_result result;
+} fit_run;
+
+static void run_fit(ovoid_context *context, const double *xyzr, size_t atoms,
+                    ovoid_fit_options *options, fit_run *run) {
+    ovoid_molecule *molecule = NULL;
+    memset(run, 0, sizeof *run);
+    options->user = &run->trace;
+    test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
+    test_check(context, ovoid_fit(context, molecule, options, &run->model, &run->result));
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void destroy_run(fit_run *run) {
+    free(run->trace.records);
+    ovoid_model_destroy(&run->model);
+}
+
+/* The parameters of a model, c and d positive. */
+static double *parameters_of(const ovoid_model *model) {
+    const size_t count = ovoid_model_size(model);
+    const ovoid_ellipsoid *const e = ovoid_model_ellipsoids(model);
+    double *const x = test_alloc(10 * count, sizeof *x);
+    for (size_t i = 0; i < count; ++i) {
+        x[10 * i] = sqrt(e[i].amplitude);
+        for (size_t k = 0; k < 3; ++k) {
+            x[10 * i + 1 + k] = sqrt(e[i].decay[k]);
+            x[10 * i + 4 + k] = e[i].centre[k];
+            x[10 * i + 7 + k] = e[i].angle[k];
+        }
+    }
+    return x;
+}
+
+/* The constrained points and phi there, in double. */
+static size_t points_of(ovoid_context *context, const double *xyzr, size_t atoms,
+                        const ovoid_fit_options *options, double **xyz, double **target) {
+    const ov_band band = {options->isovalue - 1.0, options->isovalue + 1.0};
+    const ov_sampling sampling = {0};
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    test_check(context, ov_lattice_create(context, xyzr, atoms, options->spacing, options->padding,
+                                          &lattice));
+    test_check(context,
+               ov_sample(context, xyzr, atoms, options->decay, &lattice, band, sampling, &samples));
+    const size_t count = samples.points.count;
+    float *const packed =
+        read_floats(context, &samples.points.xyz, samples.points.packs * 3 * OV_PACK);
+    *xyz = test_alloc(3 * count, sizeof **xyz);
+    *target = test_alloc(count, sizeof **target);
+    for (size_t k = 0; k < count; ++k) {
+        for (size_t axis = 0; axis < 3; ++axis)
+            (*xyz)[3 * k + axis] =
+                samples.points.origin[axis] +
+                packed[k / OV_PACK * (3 * OV_PACK) + axis * OV_PACK + k % OV_PACK];
+        (*target)[k] = reference_phi(xyzr, atoms, options->decay, *xyz + 3 * k);
+    }
+    free(packed);
+    ov_samples_destroy(&samples);
+    return count;
+}
+
+/* ---- step 1 ------------------------------------------------------------------------------- */
+
+/* phi~ = phi before the first step: with an epsilon that is too small to matter, the first record's
+ * w_s is E_s / (E_s + E_l1) of the start. */
+static void starts_with_the_atoms(void **state) {
+    fit_run run;
+    double sparse = 0.0;
+    ovoid_fit_options options = options_for(NULL, 1, 1);
+    options.l1.epsilon = 1e-30;
+    run_fit(*state, clump, ATOMS, &options, &run);
+    const ovoid_progress *const first = &run.trace.records[0];
+    for (size_t i = 0; i < ATOMS; ++i)
+        sparse += exp(0.25 * clump[4 * i + 3] * clump[4 * i + 3]) + 3.0 * sqrt(0.5);
+    const double accuracy = sparse * first->accuracy_weight / first->sparse_weight;
+    print_message("E_s at the start: %.3g at %zu points\n", accuracy, (size_t)first->points);
+    /* each of the fit's terms may miss its cut-off, 1e-5, at each point */
+    assert_true(accuracy <= (double)first->points * pow(ATOMS * 1e-5 + 5e-6, 2.0));
+    expect_near(first->accuracy_weight + first->sparse_weight, 1.0, 1e-12, "w_s + w_l");
+    /* one step of at most 0.2 in any parameter */
+    const ovoid_ellipsoid *const e = ovoid_model_ellipsoids(run.model);
+    assert_int_equal(ovoid_model_size(run.model), ATOMS);
+    for (size_t i = 0; i < ATOMS; ++i) {
+        expect_near(sqrt(e[i].amplitude), exp(0.25 * clump[4 * i + 3] * clump[4 * i + 3]), 0.2,
+                    "c");
+        for (size_t k = 0; k < 3; ++k) {
+            expect_near(sqrt(e[i].decay[k]), sqrt(0.5), 0.2, "d");
+            expect_near(e[i].centre[k], clump[4 * i + k], 1e-3, "a centre");
+            assert_true(e[i].angle[k] == 0.0); /* spheres have no direction */
+        }
+    }
+    destroy_run(&run);
+}
+
+/* ---- steps 5.4 to 5.8 --------------------------------------------------------------------- */
+
+/* X' = X - tau grad (w_s E_s + w_l E_l1), the gradient from central differences of the paper's
+ * formulas in double. X and X' come from two fits that differ by one iteration. */
+static void expect_step(ovoid_context *context, uint32_t sparse_iterations, uint32_t iterations) {
+    fit_run before, after;
+    double *xyz, *target;
+    ovoid_fit_options options = options_for(NULL, sparse_iterations, iterations);
+    options.l1.prune_every = UINT32_MAX;
+    options.l1.epsilon = 0.5;
+    run_fit(context, clump, ATOMS, &options, &before);
+    ++options.l1.iterations;
+    if (sparse_iterations == iterations)
+        ++options.l1.sparse_iterations;
+    run_fit(context, clump, ATOMS, &options, &after);
+    assert_int_equal(after.trace.count, iterations + 1);
+    const ovoid_progress *const step = &after.trace.records[iterations];
+    /* the first fit is the beginning of the second */
+    assert_true(before.trace.records[iterations - 1].accuracy_term ==
+                after.trace.records[iterations - 1].accuracy_term);
+    assert_true(step->step > 0.0);
+
+    double *const x = parameters_of(before.model), *const next = parameters_of(after.model);
+    const size_t points = points_of(context, clump, ATOMS, &options, &xyz, &target);
+    assert_int_equal(points, step->points);
+    double gradient[10 * ATOMS], largest = 0.0, largest_accuracy = 0.0;
+    for (size_t j = 0; j < 10 * ATOMS; ++j) {
+        const double h = 1e-4, middle = x[j];
+        x[j] = middle + h;
+        const double up = reference_accuracy(x, ATOMS, xyz, target, points);
+        x[j] = middle - h;
+        const double down = reference_accuracy(x, ATOMS, xyz, target, points);
+        x[j] = middle;
+        const double accuracy = step->accuracy_weight * (up - down) / (2.0 * h);
+        gradient[j] = accuracy + (j % 10 < 4 ? step->sparse_weight * (x[j] > 0.0 ? 1.0 : -1.0) : 0);
+        largest = fmax(largest, fabs(gradient[j]));
+        largest_accuracy = fmax(largest_accuracy, fabs(accuracy));
+    }
+    print_message("%s step %.3g: largest derivative %.3g, of w_s E_s alone %.3g\n", step->stage,
+                  step->step, largest, largest_accuracy);
+    assert_true(largest_accuracy > 0.1 * largest);
+    for (size_t j = 0; j < 10 * ATOMS; ++j) {
+        char what[64];
+        snprintf(what, sizeof what, "the way of parameter %zu", j);
+        expect_near((x[j] - next[j]) / step->step, gradient[j], 3e-3 * largest, what);
+    }
+    free(x);
+    free(next);
+    free(xyz);
+    free(target);
+    destroy_run(&before);
+    destroy_run(&after);
+}
+
+static void steps_along_the_gradient(void **state) {
+    const uint32_t some = (uint32_t)test_size(30, 4);
+    expect_step(*state, some, some);     /* sparse */
+    expect_step(*state, some, some + 3); /* accuracy */
+}
+
+/* Every record's weights follow from the record before, and the objective from the weights. */
+static void weights_follow_the_algorithm(void **state) {
+    const uint32_t sparse = (uint32_t)test_size(100, 8), all = (uint32_t)test_size(140, 11);
+    fit_run run;
+    size_t gated = 0, bounded = 0, balanced = 0;
+    ovoid_fit_options options = options_for(NULL, sparse, all);
+    options.l1.max_error = 0.15; /* so that the gate closes now and then */
+    options.l1.epsilon = 0.02;
+    run_fit(*state, clump, ATOMS, &options, &run);
+    assert_true(run.trace.count >= sparse);
+    for (size_t n = 0; n < run.trace.count; ++n) {
+        const ovoid_progress *const now = &run.trace.records[n], *const before = now - 1;
+        assert_int_equal(now->iteration, n + 1);
+        assert_int_equal(now->iterations, all);
+        expect_near(now->objective,
+                    now->accuracy_weight * now->accuracy_term +
+                        now->sparse_weight * now->sparse_term,
+                    1e-12 * now->objective, "the objective");
+        if (now->iteration > sparse) {
+            assert_string_equal(now->stage, "accuracy");
+            assert_true(now->accuracy_weight == 1.0 && now->sparse_weight == 0.0);
+            continue;
+        }
+        assert_string_equal(now->stage, "sparse");
+        if (n == 0 || now->ellipsoids != before->ellipsoids || before->step == 0.0)
+            continue; /* E_s was evaluated anew */
+        if (before->max_error > options.l1.max_error) {
+            assert_true(now->accuracy_weight == 1.0 && now->sparse_weight == 0.0);
+            ++gated;
+            continue;
+        }
+        const double total = before->accuracy_term + before->sparse_term;
+        const double share = before->accuracy_term / total;
+        expect_near(now->accuracy_weight, fmax(share, options.l1.epsilon), 1e-12, "w_s");
+        expect_near(now->sparse_weight, before->sparse_term / total, 1e-12, "w_l");
+        bounded += share < options.l1.epsilon;
+        balanced += share >= options.l1.epsilon;
+    }
+    print_message("%zu steps gated, %zu with w_s = epsilon, %zu balanced\n", gated, bounded,
+                  balanced);
+    assert_true(bounded > 0);
+    if (!test_small())
+        assert_true(gated > 0 && balanced > 0);
+    destroy_run(&run);
+}
+
+static void gate_can_be_open_or_shut(void **state) {
+    const double gates[] = {1e-12, INFINITY};
+    for (size_t n = 0; n < 2; ++n) {
+        fit_run run;
+        ovoid_fit_options options =
+            options_for(NULL, (uint32_t)test_size(40, 4), (uint32_t)test_size(40, 4));
+        options.l1.max_error = gates[n];
+        run_fit(*state, clump, ATOMS, &options, &run);
+        /* from the second on: the start may be exact */
+        for (size_t k = 1; k < run.trace.count; ++k)
+            if (strcmp(run.trace.records[k].stage, "sparse") == 0)
+                assert_int_equal(run.trace.records[k].sparse_weight == 0.0, n == 0);
+        destroy_run(&run);
+    }
+}
+
+/* A step that is taken lowers the objective, under the weights of its own iteration. In the
+ * accuracy phase these do not change, so there the objective never rises. */
+static void accepted_steps_descend(void **state) {
+    const uint32_t sparse = (uint32_t)test_size(120, 6), all = (uint32_t)test_size(300, 10);
+    const ovoid_first_step first_steps[] = {OVOID_FIRST_STEP_SECANT, OVOID_FIRST_STEP_GROW};
+    for (size_t which = 0; which < 2; ++which) {
+        fit_run run;
+        ovoid_fit_options options = options_for(NULL, sparse, all);
+        options.l1.prune_every = UINT32_MAX;
+        options.l1.first_step = first_steps[which];
+        run_fit(*state, clump, ATOMS, &options, &run);
+        for (size_t n = 1; n < run.trace.count; ++n) {
+            const ovoid_progress *const now = &run.trace.records[n], *const before = now - 1;
+            const double start = now->accuracy_weight * before->accuracy_term +
+                                 now->sparse_weight * before->sparse_term;
+            if (now->step > 0.0 && before->step > 0.0)
+                assert_true(now->objective < start);
+            else
+                assert_true(now->objective <= start * (1.0 + 1e-3) + 1e-6);
+        }
+        const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
+        const ovoid_progress *const turn = &run.trace.records[sparse - 1];
+        print_message("E_s %.4g after the sparse phase, %.4g at the end\n", turn->accuracy_term,
+                      last->accuracy_term);
+        assert_true(last->accuracy_term < turn->accuracy_term);
+        destroy_run(&run);
+    }
+}
+
+/* ---- step 5.1 ----------------------------------------------------------------------------- */
+
+/* Ellipsoids go at multiples of prune_every only. */
+static void pruning_keeps_its_schedule(void **state) {
+    fit_run run;
+    ovoid_fit_options options =
+        options_for(NULL, (uint32_t)test_size(30, 14), (uint32_t)test_size(30, 14));
+    options.l1.prune_every = 7;
+    options.l1.prune_below = 1.3; /* c begins between 1.28 and 2.06, and the L1 term lowers it */
+    options.l1.max_error = INFINITY;
+    run_fit(*state, clump, ATOMS, &options, &run);
+    uint64_t before = ATOMS;
+    size_t losses = 0;
+    for (size_t n = 0; n < run.trace.count; ++n) {
+        const ovoid_progress *const now = &run.trace.records[n];
+        assert_true(now->ellipsoids <= before);
+        if (now->ellipsoids < before) {
+            assert_int_equal(now->iteration % 7, 0);
+            ++losses;
+        }
+        before = now->ellipsoids;
+    }
+    assert_true(losses > 0);
+    assert_int_equal(ovoid_model_size(run.model), before);
+    destroy_run(&run);
+}
+
+/* Only what is below the bound goes, and the others keep their order. At the first step c = exp(d
+ * r^2 / 2) has moved by 0.01. */
+static void pruning_takes_what_is_below(void **state) {
+    const double xyzr[] = {0.0, 0.0, 0.0, 1.8, 3.0, 0.0,  0.0,  0.0, 6.0, 0.0,
+                           0.0, 2.0, 9.0, 0.0, 0.0, 0.05, 12.0, 0.0, 0.0, 1.7};
+    fit_run run;
+    ovoid_fit_options options = options_for(NULL, 2, 2);
+    options.spacing = 1.2;
+    options.l1.prune_every = 2;
+    options.l1.prune_below = 1.5;
+    run_fit(*state, xyzr, 5, &options, &run);
+    assert_int_equal(run.trace.records[0].ellipsoids, 5);
+    assert_int_equal(run.trace.records[1].ellipsoids, 3);
+    const ovoid_ellipsoid *const e = ovoid_model_ellipsoids(run.model);
+    for (size_t i = 0; i < 3; ++i) {
+        expect_near(e[i].centre[0], 6.0 * (double)i, 0.3, "the centre of one that stays");
+        assert_true(e[i].amplitude > 2.0);
+    }
+    destroy_run(&run);
+}
+
+static void pruning_leaves_one(void **state) {
+    fit_run run;
+    ovoid_fit_options options = options_for(NULL, 4, 4);
+    options.l1.prune_every = 3;
+    options.l1.prune_below = 1000.0;
+    run_fit(*state, clump, ATOMS, &options, &run);
+    assert_int_equal(run.trace.records[1].ellipsoids, ATOMS);
+    assert_int_equal(run.trace.records[2].ellipsoids, 1);
+    /* the largest atom's */
+    expect_near(ovoid_model_ellipsoids(run.model)[0].centre[0], clump[0], 0.5, "the centre");
+    destroy_run(&run);
+
+    options.l1.prune_below = 0.0;
+    run_fit(*state, clump, ATOMS, &options, &run);
+    assert_int_equal(run.result.ellipsoids, ATOMS);
+    destroy_run(&run);
+}
+
+/* The L1 term alone shrinks: the purpose of the method. Two coincident atoms are one too many. */
+static void sparse_phase_shrinks_the_l1_term(void **state) {
+    fit_run run;
+    ovoid_fit_options options =
+        options_for(NULL, (uint32_t)test_size(200, 8), (uint32_t)test_size(200, 8));
+    run_fit(*state, clump, ATOMS, &options, &run);
+    const ovoid_progress *const first = &run.trace.records[0];
+    const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
+    print_message("E_l1 %.4g -> %.4g, largest error %.3g\n", first->sparse_term, last->sparse_term,
+                  last->max_error);
+    assert_true(last->sparse_term < first->sparse_term - (test_small() ? 0.01 : 0.3));
+    destroy_run(&run);
+}
+
+/* ---- the end ------------------------------------------------------------------------------ */
+
+/* Where nothing can be gained the fit ends long before MaxNiter, with the atoms' own Gaussians. */
+static void ends_where_nothing_changes(void **state) {
+    fit_run run;
+    ovoid_fit_options options = options_for(NULL, 0, 100000);
+    options.l1.max_backtracks = (uint32_t)test_size(30, 10);
+    run_fit(*state, clump, ATOMS, &options, &run);
+    print_message("%zu iterations\n", (size_t)run.result.iterations);
+    assert_true(run.result.iterations < test_size(5000, 500));
+    assert_int_equal(run.result.iterations, run.trace.count);
+    assert_int_equal(run.trace.records[run.trace.count - 1].iteration, run.trace.count);
+    assert_int_equal(run.result.ellipsoids, ATOMS);
+    assert_true(run.result.max_error < 2e-4);
+    destroy_run(&run);
+}
+
+/* The result and the last record agree, and E_l1 is that of the model handed over. */
+static void result_is_the_last_record(void **state) {
+    fit_run run;
+    ovoid_fit_options options =
+        options_for(NULL, (uint32_t)test_size(30, 5), (uint32_t)test_size(50, 9));
+    run_fit(*state, clump, ATOMS, &options, &run);
+    const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
+    const ovoid_fit_result *const result = &run.result;
+    assert_int_equal(result->iterations, last->iteration);
+    assert_int_equal(result->points, last->points);
+    assert_int_equal(result->ellipsoids, last->ellipsoids);
+    assert_int_equal(result->ellipsoids, ovoid_model_size(run.model));
+    expect_near(result->rms_error, sqrt(last->accuracy_term / (double)last->points), 1e-12,
+                "the rms error");
+    assert_true(result->max_error == last->max_error);
+    double *const x = parameters_of(run.model);
+    expect_near(last->sparse_term, reference_sparsity(x, (size_t)result->ellipsoids),
+                1e-9 * last->sparse_term, "E_l1");
+    /* and E_s that of the model, by the paper's formula */
+    double *xyz, *target;
+    const size_t points = points_of(*state, clump, ATOMS, &options, &xyz, &target);
+    const double accuracy = reference_accuracy(x, (size_t)result->ellipsoids, xyz, target, points);
+    expect_near(last->accuracy_term, accuracy, 2e-3 * accuracy, "E_s");
+    free(x);
+    free(xyz);
+    free(target);
+    destroy_run(&run);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(starts_with_the_atoms),
+        cmocka_unit_test(steps_along_the_gradient),
+        cmocka_unit_test(weights_follow_the_algorithm),
+        cmocka_unit_test(gate_can_be_open_or_shut),
+        cmocka_unit_test(accepted_steps_descend),
+        cmocka_unit_test(pruning_keeps_its_schedule),
+        cmocka_unit_test(pruning_takes_what_is_below),
+        cmocka_unit_test(pruning_leaves_one),
+        cmocka_unit_test(sparse_phase_shrinks_the_l1_term),
+        cmocka_unit_test(ends_where_nothing_changes),
+        cmocka_unit_test(result_is_the_last_record),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

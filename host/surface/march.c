@@ -1,6 +1,7 @@
 #include "surface/march.h"
 
 #include "field/bricks.h"
+#include "surface/brick_grid.h"
 #include "surface/case_table.h"
 #include "surface/mesh.h"
 
@@ -16,18 +17,6 @@
 #define CROSSING 4   /* values per brick: number of the first vertex, masks along x, y, z */
 #define BRICK_RUN 32 /* bricks per work-item of the kernels over all bricks, on CPUs */
 
-/* Bricks of a piece, within a grid with one more along each axis for its neighbours' first ones. */
-typedef struct brick_grid {
-    uint64_t bricks[3], padded[3];
-    size_t total, padded_total;
-    uint32_t *curve; /* the bricks, raster numbers, along a space-filling curve */
-    cl_uint *face;   /* the first bricks along x, then y, then z, numbers in the padded grid */
-    size_t face_start[4];
-    cl_uint *ghost; /* those beyond the last ones: along x, y, z, xy, xz, yz, xyz */
-    size_t ghosts;
-    cl_uint *place; /* pack with the values of a brick of the padded grid */
-} brick_grid;
-
 /* What a piece leaves behind for those before it: its faces. */
 typedef struct piece_faces {
     float *value;      /* OV_PACK per face brick */
@@ -40,7 +29,7 @@ typedef struct marcher {
     ov_pieces pieces;
     piece_faces *faces; /* of each piece; empty where not needed, or no longer */
     size_t faces_end;   /* those from here on are gone */
-    brick_grid grid;
+    ov_brick_grid grid;
     uint64_t at[3]; /* the current piece */
     double corner[3];
 
@@ -77,88 +66,6 @@ typedef struct marcher {
     size_t new_vertices, new_triangles; /* of the piece */
 } marcher;
 
-/* ---- the grid of bricks ------------------------------------------------------------------- */
-
-static cl_uint padded_number(const brick_grid *grid, uint64_t x, uint64_t y, uint64_t z) {
-    return (cl_uint)((z * grid->padded[1] + y) * grid->padded[0] + x);
-}
-
-static void list_faces(brick_grid *grid) {
-    const uint64_t *const n = grid->bricks;
-    size_t k = 0;
-    for (uint64_t z = 0; z < n[2]; ++z)
-        for (uint64_t y = 0; y < n[1]; ++y)
-            grid->face[k++] = padded_number(grid, 0, y, z);
-    for (uint64_t z = 0; z < n[2]; ++z)
-        for (uint64_t x = 0; x < n[0]; ++x)
-            grid->face[k++] = padded_number(grid, x, 0, z);
-    for (uint64_t y = 0; y < n[1]; ++y)
-        for (uint64_t x = 0; x < n[0]; ++x)
-            grid->face[k++] = padded_number(grid, x, y, 0);
-}
-
-/* In the order in which fill_ghosts() takes them from the neighbours' faces. */
-static void list_ghosts(brick_grid *grid) {
-    const uint64_t *const n = grid->bricks;
-    cl_uint *next = grid->ghost;
-    for (uint64_t z = 0; z < n[2]; ++z)
-        for (uint64_t y = 0; y < n[1]; ++y)
-            *next++ = padded_number(grid, n[0], y, z);
-    for (uint64_t z = 0; z < n[2]; ++z)
-        for (uint64_t x = 0; x < n[0]; ++x)
-            *next++ = padded_number(grid, x, n[1], z);
-    for (uint64_t y = 0; y < n[1]; ++y)
-        for (uint64_t x = 0; x < n[0]; ++x)
-            *next++ = padded_number(grid, x, y, n[2]);
-    for (uint64_t z = 0; z < n[2]; ++z)
-        *next++ = padded_number(grid, n[0], n[1], z);
-    for (uint64_t y = 0; y < n[1]; ++y)
-        *next++ = padded_number(grid, n[0], y, n[2]);
-    for (uint64_t x = 0; x < n[0]; ++x)
-        *next++ = padded_number(grid, x, n[1], n[2]);
-    *next = padded_number(grid, n[0], n[1], n[2]);
-}
-
-/* Evaluated bricks come first among the packs, along the curve; then the others. */
-static void place_bricks(brick_grid *grid) {
-    const uint64_t nx = grid->bricks[0], ny = grid->bricks[1];
-    for (size_t k = 0; k < grid->total; ++k) {
-        const uint32_t brick = grid->curve[k];
-        grid->place[padded_number(grid, brick % nx, brick / nx % ny, brick / (nx * ny))] =
-            (cl_uint)k;
-    }
-    for (size_t k = 0; k < grid->ghosts; ++k)
-        grid->place[grid->ghost[k]] = (cl_uint)(grid->total + k);
-}
-
-static ovoid_status make_grid(ovoid_context *context, const ov_pieces *pieces, brick_grid *grid) {
-    static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
-    const uint64_t *const n = grid->bricks;
-    for (int axis = 0; axis < 3; ++axis) {
-        grid->bricks[axis] = pieces->size[axis] / brick[axis];
-        grid->padded[axis] = grid->bricks[axis] + 1;
-    }
-    grid->total = n[0] * n[1] * n[2];
-    grid->padded_total = grid->padded[0] * grid->padded[1] * grid->padded[2];
-    grid->face_start[1] = n[1] * n[2];
-    grid->face_start[2] = grid->face_start[1] + n[0] * n[2];
-    grid->face_start[3] = grid->face_start[2] + n[0] * n[1];
-    grid->ghosts = grid->padded_total - grid->total;
-    grid->curve = ov_alloc(context, grid->total, sizeof *grid->curve, "lattice bricks");
-    grid->face = ov_alloc(context, grid->face_start[3], sizeof *grid->face, "lattice bricks");
-    grid->ghost = ov_alloc(context, grid->ghosts, sizeof *grid->ghost, "lattice bricks");
-    grid->place = ov_alloc(context, grid->padded_total, sizeof *grid->place, "lattice bricks");
-    if (!grid->curve || !grid->face || !grid->ghost || !grid->place)
-        return OVOID_ERROR_MEMORY;
-    const ovoid_status status = ov_bricks_order(context, n, grid->curve);
-    if (status != OVOID_OK)
-        return status;
-    list_faces(grid);
-    list_ghosts(grid);
-    place_bricks(grid);
-    return OVOID_OK;
-}
-
 /* ---- setting up --------------------------------------------------------------------------- */
 
 static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
@@ -184,7 +91,7 @@ static ovoid_status upload(ovoid_context *context, ov_buffer *buffer, const void
 
 static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
-    const brick_grid *const grid = &m->grid;
+    const ov_brick_grid *const grid = &m->grid;
     const size_t padded = grid->padded_total, faces = grid->face_start[3];
     const size_t moved = faces > grid->ghosts ? faces : grid->ghosts;
     ov_case_table cases;
@@ -227,7 +134,7 @@ static ovoid_status set_up(ovoid_context *context, marcher *m) {
     m->group = ov_item_group(device);
     m->run = device->shape.lanes == 1 ? BRICK_RUN : 1;
     OV_TRY(make_kernels(context, m));
-    OV_TRY(make_grid(context, &m->pieces, &m->grid));
+    OV_TRY(ov_brick_grid_create(context, m->pieces.size, &m->grid));
     OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
     OV_TRY(reserve_piece(context, m));
 cleanup:
@@ -273,7 +180,7 @@ static size_t copy_ghosts(marcher *m, size_t ghost, size_t piece, size_t face, s
  * 0, which evaluation has left there. */
 static ovoid_status fill_ghosts(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
-    const brick_grid *const grid = &m->grid;
+    const ov_brick_grid *const grid = &m->grid;
     const size_t *const start = grid->face_start, nx = grid->bricks[0], ny = grid->bricks[1],
                         nz = grid->bricks[2];
     const cl_uint count = (cl_uint)grid->ghosts;
@@ -310,7 +217,7 @@ static bool has_lower_neighbour(const marcher *m) {
 /* Keeps the piece's faces for the neighbours below, which come later. */
 static ovoid_status keep_faces(ovoid_context *context, marcher *m, size_t piece) {
     ovoid_status status = OVOID_OK;
-    const brick_grid *const grid = &m->grid;
+    const ov_brick_grid *const grid = &m->grid;
     const size_t faces = grid->face_start[3];
     const cl_uint count = (cl_uint)faces;
     piece_faces *const kept = &m->faces[piece];
@@ -380,13 +287,13 @@ static size_t bits_in(cl_uint mask) {
 
 /* Numbers vertices and triangles along the curve, and lists the bricks that have some. */
 static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
-    const brick_grid *const grid = &m->grid;
+    const ov_brick_grid *const grid = &m->grid;
     const uint64_t nx = grid->bricks[0], ny = grid->bricks[1];
     size_t vertices = 0, triangles = 0;
     m->active_count = 0;
     for (size_t i = 0; i < grid->total; ++i) {
         const uint32_t k = grid->curve[i];
-        const cl_uint brick = padded_number(grid, k % nx, k / nx % ny, k / (nx * ny));
+        const cl_uint brick = ov_brick_number(grid, k % nx, k / nx % ny, k / (nx * ny));
         cl_uint *const crossing = m->host_crossing + (size_t)brick * CROSSING;
         const size_t own = bits_in(crossing[1]) + bits_in(crossing[2]) + bits_in(crossing[3]);
         crossing[0] = (cl_uint)(m->vertices + vertices);
@@ -411,7 +318,7 @@ static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
 /* Signs, crossed edges, numbers. */
 static ovoid_status classify(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
-    const brick_grid *const grid = &m->grid;
+    const ov_brick_grid *const grid = &m->grid;
     const cl_uint padded = (cl_uint)grid->padded_total, nx = (cl_uint)grid->bricks[0],
                   ny = (cl_uint)grid->bricks[1], nz = (cl_uint)grid->bricks[2];
     const cl_float isovalue = (cl_float)m->options->isovalue;
@@ -695,8 +602,7 @@ static void destroy_marcher(marcher *m) {
                                   &m->place,  &m->values,  &m->crossings};
     ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
                                   &m->fill_vertices, &m->fill_triangles, &m->refine};
-    void *const memory[] = {m->grid.curve,     m->grid.face,     m->grid.ghost, m->grid.place,
-                            m->quadrics,       m->host_crossing, m->host_count, m->ghost_value,
+    void *const memory[] = {m->quadrics,       m->host_crossing, m->host_count, m->ghost_value,
                             m->ghost_crossing, m->active,        m->edges,      m->boxes,
                             m->refined,        m->xyz,           m->normals,    m->triangle};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
@@ -708,6 +614,7 @@ static void destroy_marcher(marcher *m) {
     for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
         drop_faces(&m->faces[k]);
     free(m->faces);
+    ov_brick_grid_destroy(&m->grid);
     ov_pieces_destroy(&m->pieces);
     ov_points_destroy(&m->points);
     ov_terms_destroy(&m->terms);

@@ -1,0 +1,58 @@
+"""What the benchmarks written in Python share: finding molecules, running the tool, tables."""
+
+import csv
+import json
+import os
+import subprocess
+import tempfile
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def read_table(path):
+    """Rows of a CSV file, less its lines that start with '#'."""
+    with open(path, encoding="utf-8") as lines:
+        return list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+def write_table(path, comment, columns, rows):
+    """The file appears whole or not at all."""
+    beside = path + ".part"
+    with open(beside, "w", encoding="utf-8", newline="") as out:
+        out.write(f"# {comment}\n")
+        table = csv.DictWriter(out, columns, extrasaction="ignore", lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
+    os.replace(beside, path)
+
+
+def paper_table(number):
+    """Rows of Table 1 or 2 of the paper."""
+    return read_table(os.path.join(HERE, f"paper_table{number}.csv"))
+
+
+def paper_counts(column="ellipsoids"):
+    """Table 1: molecule -> number of kernels."""
+    return {row["molecule"]: int(row[column]) for row in paper_table(1)}
+
+
+def find(folder, name):
+    for extension in (".pqr", ".pqr.gz"):
+        path = os.path.join(folder, name + extension)
+        if os.path.exists(path):
+            return path
+    return None
+
+
+def report_of(ovoid, arguments):
+    """Runs the tool, which must succeed, and returns its report."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = os.path.join(folder, "report.json")
+        subprocess.run([ovoid] + arguments + ["--quiet", "--report", report], check=True)
+        with open(report, encoding="utf-8") as text:
+            return json.load(text)
+
+
+def short(value, digits=4):
+    """Floats to so many significant digits, for tables; all else as it is."""
+    return float(f"{value:.{digits}g}") if isinstance(value, float) else value

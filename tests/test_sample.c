@@ -200,6 +200,16 @@ static void lattice_of_several_pieces(void **state) {
     }
 }
 
+/* Pieces that no atom reaches lie outside, and belong to a band that begins at 0. */
+static void pieces_without_atoms(void **state) {
+    const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
+    job j = {
+        .xyzr = xyzr, .atoms = 2, .decay = 0.5, .spacing = 0.6, .padding = 1.0, .band = {0.0, 2.0}};
+    const size_t all = expect_samples(*state, &j);
+    j.band.low = 0.02;
+    assert_true(expect_samples(*state, &j) < all / 10);
+}
+
 static void odd_molecules(void **state) {
     const double one[] = {1.0, 2.0, 3.0, 1.7};
     const double bare[] = {0.0, 0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.2};
@@ -238,6 +248,13 @@ static void empty_band_is_an_error(void **state) {
     assert_null(samples.value.memory);
 }
 
+/* Counts the questions in *user; says stop to the third. */
+static bool stop_at_third(uint64_t points, void *user) {
+    uint64_t *const asked = user;
+    (void)points;
+    return ++*asked < 3;
+}
+
 /* Two atoms ten thousand angstrom apart: the space between costs nothing where the band ends above
  * 0, and is refused, before memory runs out, where it does not. */
 static void empty_space_between_atoms(void **state) {
@@ -256,18 +273,13 @@ static void empty_space_between_atoms(void **state) {
                 samples.points.count < 2.1 * (double)single);
     ov_samples_destroy(&samples);
     test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.1, 3.0, &lattice));
-    test_refused(*state,
-                 ov_sample(*state, xyzr, 2, 0.5, &lattice, everything, no_questions, &samples),
+    uint64_t asked = 0; /* the refusal comes before the first piece */
+    const ov_sampling sampling = {stop_at_third, &asked};
+    test_refused(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, everything, sampling, &samples),
                  OVOID_ERROR_LIMIT, "constrained points");
+    assert_int_equal(asked, 0);
     test_refused(*state, ov_lattice_create(*state, xyzr, 2, 1e-3, 3.0, &lattice), OVOID_ERROR_LIMIT,
                  "1e12");
-}
-
-/* Counts the questions in *user; says stop to the third. */
-static bool stop_at_third(uint64_t points, void *user) {
-    uint64_t *const asked = user;
-    (void)points;
-    return ++*asked < 3;
 }
 
 /* Sampling can be stopped between pieces, and leaves nothing behind. */
@@ -291,6 +303,7 @@ int main(void) {
         cmocka_unit_test(small_molecule),
         cmocka_unit_test(exterior_points_are_kept),
         cmocka_unit_test(lattice_of_several_pieces),
+        cmocka_unit_test(pieces_without_atoms),
         cmocka_unit_test(odd_molecules),
         cmocka_unit_test(band_follows_the_sum),
         cmocka_unit_test(empty_band_is_an_error),

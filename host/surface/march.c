@@ -371,7 +371,6 @@ static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t pac
                   ny = (cl_uint)m->grid.bricks[1];
     const cl_float isovalue = (cl_float)m->options->isovalue;
     const cl_int logarithmic = m->options->vertices == OVOID_VERTEX_EXACT;
-    float last[OV_PACK];
     OV_TRY(ov_buffer_reserve(context, &m->edge, room * sizeof(cl_uint), "edges of vertices"));
     OV_TRY(ov_buffer_reserve(context, &m->t, room * sizeof(cl_float), "vertices"));
     OV_TRY(OV_LAUNCH(context, &m->fill_vertices, m->active_count, m->group, OV_ARG(active),
@@ -379,16 +378,16 @@ static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t pac
                      OV_ARG(logarithmic), OV_ARG(m->place.memory), OV_ARG(m->value.memory),
                      OV_ARG(m->crossing.memory), OV_ARG(m->edge.memory), OV_ARG(m->t.memory)));
     OV_TRY(ov_grow(context, &m->edges, &m->edges_capacity, room, sizeof *m->edges, "vertices"));
+    OV_TRY(
+        ov_grow(context, &m->refined, &m->refined_capacity, room, sizeof *m->refined, "vertices"));
     OV_TRY(ov_buffer_read(context, &m->edge, 0, m->edges, count * sizeof *m->edges));
-    OV_TRY(ov_buffer_read(context, &m->t, (count - 1) * sizeof *last, last, sizeof *last));
+    OV_TRY(ov_buffer_read(context, &m->t, 0, m->refined, count * sizeof *m->refined));
     for (size_t k = count; k < room; ++k) {
         m->edges[k] = m->edges[count - 1];
-        last[k - count] = k == count ? last[0] : last[k - count - 1];
+        m->refined[k] = m->refined[count - 1];
     }
-    OV_TRY(ov_buffer_write(context, &m->edge, count * sizeof *m->edges, m->edges + count,
-                           (room - count) * sizeof *m->edges));
-    OV_TRY(
-        ov_buffer_write(context, &m->t, count * sizeof *last, last, (room - count) * sizeof *last));
+    OV_TRY(ov_buffer_write(context, &m->edge, 0, m->edges, room * sizeof *m->edges));
+    OV_TRY(ov_buffer_write(context, &m->t, 0, m->refined, room * sizeof *m->refined));
 cleanup:
     return status;
 }

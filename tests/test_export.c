@@ -433,6 +433,9 @@ static void locale_changes_nothing(void **state) {
     if (!comma_enter(s)) {
         setlocale(LC_ALL, "C");
         print_message("no locale with a decimal comma here\n");
+        for (size_t i = 0; i < NAMES; i++)
+            free(plain[i]);
+        ovoid_model_destroy(&model);
         skip();
     }
     for (size_t i = 0; i < NAMES; i++)

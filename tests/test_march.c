@@ -455,16 +455,23 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
     for (int rule = 0; rule < 2; ++rule) {
         const ovoid_mesh_options options = options_of(c, 0.5, (ovoid_vertex_rule)rule);
         size_t at_origin = 0;
+        double sum[3] = {0};
         test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
         expect_closed(mesh);
         for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
             const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
             const float *const n = ovoid_mesh_normals(mesh) + 3 * v;
-            at_origin += y[0] == 0.0 && y[1] == 0.0 && y[2] == 0.0;
+            if (y[0] == 0.0 && y[1] == 0.0 && y[2] == 0.0) {
+                ++at_origin;
+                for (int k = 0; k < 3; ++k)
+                    sum[k] += n[k];
+            }
             expect_near((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2], 1.0, 1e-5,
                         "a normal's square");
         }
         assert_int_equal(at_origin, 4); /* the origin is inside: on the edges up and down from it */
+        for (int k = 0; k < 3; ++k)
+            expect_near(sum[k], 0.0, 2.0, "the sum of four normals that face all ways");
         ovoid_mesh_destroy(&mesh);
     }
     ovoid_molecule_destroy(&molecule);
@@ -637,19 +644,49 @@ static void far_from_the_origin(void **state) {
 
 /* A box of 1e17 lattice points; what is evaluated follows the two atoms. */
 static void memory_follows_the_surface(void **state) {
-    static const uint64_t small[3] = {16, 16, 16};
+    static const uint64_t limits[][3] = {{4, 4, 4}, OV_MARCH_PIECE};
     const double xyzr[8] = {0.0, 0.0, 0.0, 1.5, 2e5, -3e5, 4e5, 1.5};
     const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
     ov_quadric *const quadrics = quadrics_of(xyzr, 2, 0.5);
     ov_body bodies[2];
-    ovoid_mesh *mesh = NULL;
     for (size_t i = 0; i < 2; ++i)
         ov_body_of_atom(xyzr + 4 * i, 0.5, &bodies[i]);
-    test_check(*state, ov_march(*state, bodies, 2, &options, test_small() ? small : whole, &mesh));
-    assert_int_equal(expect_surface(mesh, quadrics, 2, &options), 4);
-    assert_int_equal(ovoid_mesh_components(mesh), 2);
-    ovoid_mesh_destroy(&mesh);
+    for (size_t k = 0; k < test_size(2, 1); ++k) {
+        ovoid_mesh *mesh = NULL;
+        test_check(*state, ov_march(*state, bodies, 2, &options, limits[k], &mesh));
+        assert_int_equal(expect_surface(mesh, quadrics, 2, &options), 4);
+        assert_int_equal(ovoid_mesh_components(mesh), 2);
+        ovoid_mesh_destroy(&mesh);
+    }
     free(quadrics);
+}
+
+/* With one atom no piece is there that need not be. Its surface ends now in the first points of a
+ * piece, now in the last, and a neighbour has only the other end of the edges. */
+static void pieces_reach_as_far_as_the_surface(void **state) {
+    enum { BOX = 13 };
+    static const uint64_t limit[3] = {4, 2, 2};
+    const double spacing = 0.5;
+    const int64_t low[3] = {-6, -6, -6};
+    const size_t box[3] = {BOX, BOX, BOX};
+    const ovoid_mesh_options options = options_of(1.0, spacing, OVOID_VERTEX_LINEAR);
+    test_random random = {15};
+    for (size_t k = 0; k < test_size(40, 2); ++k) {
+        double xyzr[4];
+        for (int axis = 0; axis < 3; ++axis)
+            xyzr[axis] = random_uniform(&random, -0.8, 0.8);
+        xyzr[3] = random_uniform(&random, 0.7, 1.8);
+        ov_body body;
+        reference_mesh wanted;
+        ovoid_mesh *mesh = NULL;
+        ov_body_of_atom(xyzr, 0.5, &body);
+        reference_march(&body.quadric, 1, 1.0, spacing, low, box, &wanted);
+        test_check(*state, ov_march(*state, &body, 1, &options, limit, &mesh));
+        assert_int_equal(expect_closed(mesh), 2);
+        expect_same(mesh, &wanted, 1e-5);
+        ovoid_mesh_destroy(&mesh);
+        reference_mesh_destroy(&wanted);
+    }
 }
 
 static void two_runs_are_the_same(void **state) {
@@ -786,6 +823,7 @@ int main(void) {
         cmocka_unit_test(values_equal_to_the_isovalue_are_inside),
         cmocka_unit_test(far_from_the_origin),
         cmocka_unit_test(memory_follows_the_surface),
+        cmocka_unit_test(pieces_reach_as_far_as_the_surface),
         cmocka_unit_test(two_runs_are_the_same),
         cmocka_unit_test(a_protein_is_closed),
         cmocka_unit_test(refusals),

@@ -73,7 +73,8 @@ static void lists_follow_moving_ellipsoids(void **state) {
         double *const xyz = make_samples(*state, &random, count, half, 1.0, &samples, &targets);
         double *const x = test_alloc(terms * SIZE, sizeof *x);
         ov_quadric *const quadrics = test_alloc(terms, sizeof *quadrics);
-        test_check(*state, ov_l1_objective_create(*state, &samples, terms, &objective));
+        test_check(*state, ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID, terms,
+                                                  &objective));
         for (size_t i = 0; i < terms; ++i) {
             double *const p = x + i * SIZE;
             p[OV_L1_C] = random_uniform(&random, 1.0, 2.0);
@@ -137,7 +138,8 @@ static void lists_follow_pruning(void **state) {
     ov_l1_evaluation result;
     double *targets, x[TERMS * SIZE];
     double *const xyz = make_samples(*state, &random, COUNT, half, 1.0, &samples, &targets);
-    test_check(*state, ov_l1_objective_create(*state, &samples, TERMS, &objective));
+    test_check(*state,
+               ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID, TERMS, &objective));
     for (size_t i = 0; i < TERMS * SIZE; ++i)
         x[i] = random_uniform(&random, 0.5, 1.5);
     for (size_t count = TERMS; count > 0; --count) {
@@ -205,7 +207,8 @@ static void gradient_equals_central_differences(void **state) {
             double *const xyz = make_samples(*state, &random, count, half, 2.0, &samples, &targets);
             double largest = 0.0;
             shape_parameters(&random, (shape)kind, x, TERMS);
-            test_check(*state, ov_l1_objective_create(*state, &samples, TERMS, &objective));
+            test_check(*state, ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID,
+                                                      TERMS, &objective));
             test_check(*state, ov_l1_evaluate(&objective, x, TERMS, &result));
             test_check(*state, ov_l1_gradient(&objective, x, TERMS, w, gradient));
             for (size_t j = 0; j < TERMS * SIZE; ++j) {
@@ -223,7 +226,8 @@ static void gradient_equals_central_differences(void **state) {
                 snprintf(what, sizeof what, "shape %d: component %zu of the gradient", kind, j);
                 expect_near(gradient[j], slope[j], 1e-4 * largest, what);
             }
-            expect_near(ov_l1_sparse_term(x, TERMS), reference_sparsity(x, TERMS), 1e-12, "E_l1");
+            expect_near(ov_l1_sparse_term(&objective, x, TERMS), reference_sparsity(x, TERMS),
+                        1e-12, "E_l1");
             ov_l1_objective_destroy(&objective);
             ov_samples_destroy(&samples);
             free(targets);
@@ -244,7 +248,8 @@ static void gradient_at_zero(void **state) {
     shape_parameters(&random, RANDOM, x, 2);
     x[OV_L1_C] = 0.0;
     x[SIZE + OV_L1_D] = 0.0;
-    test_check(*state, ov_l1_objective_create(*state, &samples, 2, &objective));
+    test_check(*state,
+               ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID, 2, &objective));
     test_check(*state, ov_l1_evaluate(&objective, x, 2, &result));
     test_check(*state, ov_l1_gradient(&objective, x, 2, w, gradient));
     assert_true(gradient[OV_L1_C] == 0.0);

@@ -458,6 +458,7 @@ static void failures_leave_nothing(void **state) {
         const char *path = scratch_path(s, names[i]);
         if (access("/dev/full", W_OK) != 0 || symlink("/dev/full", path) != 0) {
             print_message("no /dev/full here\n");
+            ovoid_model_destroy(&model);
             skip();
         }
         test_refused(context, ovoid_model_export(context, model, path, NULL), OVOID_ERROR_IO,

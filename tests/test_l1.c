@@ -215,11 +215,11 @@ static void expect_step(ovoid_context *context, ovoid_kernel kernel, uint32_t sp
 }
 
 static void steps_along_the_gradient(void **state) {
-    const uint32_t some = (uint32_t)test_size(30, 4);
+    const uint32_t some = (uint32_t)test_size(30, 2), more = (uint32_t)test_size(33, 3);
     const ovoid_kernel kernels[] = {OVOID_KERNEL_ELLIPSOID, OVOID_KERNEL_SPHERE};
     for (size_t k = 0; k < 2; ++k) {
-        expect_step(*state, kernels[k], some, some);     /* sparse */
-        expect_step(*state, kernels[k], some, some + 3); /* accuracy */
+        expect_step(*state, kernels[k], some, some); /* sparse */
+        expect_step(*state, kernels[k], some, more); /* accuracy */
     }
 }
 
@@ -229,10 +229,10 @@ static void spheres_change_amplitudes_alone(void **state) {
     fit_run run;
     double moved = 0.0, sparse = 0.0;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(200, 10), (uint32_t)test_size(240, 14));
+        options_for(NULL, (uint32_t)test_size(200, 6), (uint32_t)test_size(240, 8));
     options.l1.kernel = OVOID_KERNEL_SPHERE;
     options.l1.prune_below = 1.0; /* so that some are deleted */
-    options.l1.prune_every = (uint32_t)test_size(20, 4);
+    options.l1.prune_every = (uint32_t)test_size(20, 3);
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_ellipsoid *const e = ovoid_model_ellipsoids(run.model);
     const size_t count = ovoid_model_size(run.model);
@@ -261,7 +261,7 @@ static void spheres_change_amplitudes_alone(void **state) {
 
 /* Every record's weights follow from the record before, and the objective from the weights. */
 static void weights_follow_the_algorithm(void **state) {
-    const uint32_t sparse = (uint32_t)test_size(100, 8), all = (uint32_t)test_size(140, 11);
+    const uint32_t sparse = (uint32_t)test_size(100, 5), all = (uint32_t)test_size(140, 7);
     fit_run run;
     size_t gated = 0, bounded = 0, balanced = 0;
     ovoid_fit_options options = options_for(NULL, sparse, all);
@@ -310,7 +310,7 @@ static void gate_can_be_open_or_shut(void **state) {
     for (size_t n = 0; n < 2; ++n) {
         fit_run run;
         ovoid_fit_options options =
-            options_for(NULL, (uint32_t)test_size(40, 4), (uint32_t)test_size(40, 4));
+            options_for(NULL, (uint32_t)test_size(40, 3), (uint32_t)test_size(40, 3));
         options.l1.max_error = gates[n];
         run_fit(*state, clump, ATOMS, &options, &run);
         /* from the second on: the start may be exact */
@@ -324,7 +324,7 @@ static void gate_can_be_open_or_shut(void **state) {
 /* A step that is taken lowers the objective, under the weights of its own iteration. In the
  * accuracy phase these do not change, so there the objective never rises. */
 static void accepted_steps_descend(void **state) {
-    const uint32_t sparse = (uint32_t)test_size(120, 6), all = (uint32_t)test_size(300, 10);
+    const uint32_t sparse = (uint32_t)test_size(120, 3), all = (uint32_t)test_size(300, 5);
     const ovoid_first_step first_steps[] = {OVOID_FIRST_STEP_SECANT, OVOID_FIRST_STEP_GROW};
     for (size_t which = 0; which < 2; ++which) {
         fit_run run;
@@ -356,8 +356,8 @@ static void accepted_steps_descend(void **state) {
 static void pruning_keeps_its_schedule(void **state) {
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(30, 14), (uint32_t)test_size(30, 14));
-    options.l1.prune_every = 7;
+        options_for(NULL, (uint32_t)test_size(30, 6), (uint32_t)test_size(30, 6));
+    options.l1.prune_every = (uint32_t)test_size(7, 3);
     options.l1.prune_below = 1.3; /* c begins between 1.28 and 2.06, and the L1 term lowers it */
     options.l1.max_error = INFINITY;
     run_fit(*state, clump, ATOMS, &options, &run);
@@ -367,7 +367,7 @@ static void pruning_keeps_its_schedule(void **state) {
         const ovoid_progress *const now = &run.trace.records[n];
         assert_true(now->ellipsoids <= before);
         if (now->ellipsoids < before) {
-            assert_int_equal(now->iteration % 7, 0);
+            assert_int_equal(now->iteration % options.l1.prune_every, 0);
             ++losses;
         }
         before = now->ellipsoids;
@@ -420,7 +420,7 @@ static void pruning_leaves_one(void **state) {
 static void sparse_phase_shrinks_the_l1_term(void **state) {
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(200, 8), (uint32_t)test_size(200, 8));
+        options_for(NULL, (uint32_t)test_size(200, 4), (uint32_t)test_size(200, 4));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const first = &run.trace.records[0];
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
@@ -451,7 +451,7 @@ static void ends_where_nothing_changes(void **state) {
 static void result_is_the_last_record(void **state) {
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(30, 5), (uint32_t)test_size(50, 9));
+        options_for(NULL, (uint32_t)test_size(30, 3), (uint32_t)test_size(50, 5));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
     const ovoid_fit_result *const result = &run.result;

@@ -402,18 +402,20 @@ static void a_ring_has_a_hole(void **state) {
 
 /* Atoms on a sphere: an outer wall and that of the cavity, whose volume counts negative. */
 static void a_hollow_shell_has_two_walls(void **state) {
-    enum { SHELL = 120 };
-    double xyzr[4 * SHELL];
+    enum { MOST = 120 };
+    double xyzr[4 * MOST];
+    const size_t shell = test_size(MOST, 56);
+    const double wide = 5.0 * sqrt((double)shell / MOST);
     const ovoid_mesh_options options = options_of(1.0, coarse(0.5), OVOID_VERTEX_EXACT);
-    for (size_t i = 0; i < SHELL; ++i) {
-        const double z = (2.0 * (double)i + 1.0) / SHELL - 1.0,
+    for (size_t i = 0; i < shell; ++i) {
+        const double z = (2.0 * (double)i + 1.0) / (double)shell - 1.0,
                      angle = PI * (3.0 - sqrt(5.0)) * (double)i;
-        xyzr[4 * i] = 5.0 * sqrt(1.0 - z * z) * cos(angle);
-        xyzr[4 * i + 1] = 5.0 * sqrt(1.0 - z * z) * sin(angle);
-        xyzr[4 * i + 2] = 5.0 * z;
+        xyzr[4 * i] = wide * sqrt(1.0 - z * z) * cos(angle);
+        xyzr[4 * i + 1] = wide * sqrt(1.0 - z * z) * sin(angle);
+        xyzr[4 * i + 2] = wide * z;
         xyzr[4 * i + 3] = 1.2;
     }
-    ovoid_mesh *mesh = expect_atoms(*state, xyzr, SHELL, 0.7, &options, 4, 2);
+    ovoid_mesh *mesh = expect_atoms(*state, xyzr, shell, 0.7, &options, 4, 2);
     const ovoid_component *const a = ovoid_mesh_component(mesh, 0), *const b = ovoid_mesh_component(
                                                                         mesh, 1);
     assert_true(a->outer != b->outer);
@@ -453,7 +455,7 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
     test_check(*state, ovoid_molecule_create(*state, xyzr, 2, &molecule));
     test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, origin, 1, &c, NULL));
     for (int rule = 0; rule < 2; ++rule) {
-        const ovoid_mesh_options options = options_of(c, 0.5, (ovoid_vertex_rule)rule);
+        const ovoid_mesh_options options = options_of(c, coarse(0.5), (ovoid_vertex_rule)rule);
         size_t at_origin = 0;
         double sum[3] = {0};
         test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
@@ -598,19 +600,20 @@ static void exact_vertices_stay_on_their_edges(void **state) {
 
 /* ---- lattices ----------------------------------------------------------------------------- */
 
-/* phi is c at many lattice points: a cube of atoms at lattice points. */
+/* phi is c at many lattice points: a cube of atoms at lattice points, or an edge of it. */
 static void values_equal_to_the_isovalue_are_inside(void **state) {
     double xyzr[4 * 8];
-    for (size_t i = 0; i < 8; ++i) {
+    const size_t atoms = test_size(8, 2);
+    for (size_t i = 0; i < atoms; ++i) {
         for (size_t k = 0; k < 3; ++k)
             xyzr[4 * i + k] = i >> k & 1 ? 8.0 : 0.0;
         xyzr[4 * i + 3] = 2.0;
     }
     for (int rule = 0; rule < 2; ++rule) {
         const ovoid_mesh_options options = options_of(1.0, 1.0, (ovoid_vertex_rule)rule);
-        ovoid_mesh *mesh = mesh_atoms(*state, xyzr, 8, 0.5, &options);
-        assert_int_equal(expect_closed(mesh), 16);
-        assert_int_equal(ovoid_mesh_components(mesh), 8);
+        ovoid_mesh *mesh = mesh_atoms(*state, xyzr, atoms, 0.5, &options);
+        assert_int_equal(expect_closed(mesh), 2 * atoms);
+        assert_int_equal(ovoid_mesh_components(mesh), atoms);
         double low = INFINITY, high = -INFINITY;
         for (size_t k = 0; k < 3 * ovoid_mesh_vertices(mesh); ++k) {
             low = fmin(low, ovoid_mesh_xyz(mesh)[k]);
@@ -627,13 +630,14 @@ static void far_from_the_origin(void **state) {
     test_random random = {13};
     const double far[3] = {40000.0, -90000.0, 262144.0};
     double here[4 * 10], there[4 * 10];
-    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
-    for (size_t k = 0; k < 40; ++k) {
+    const size_t atoms = test_size(10, 4);
+    const ovoid_mesh_options options = options_of(1.0, coarse(0.5), OVOID_VERTEX_EXACT);
+    for (size_t k = 0; k < 4 * atoms; ++k) {
         here[k] = k % 4 == 3 ? 1.5 : round(random_uniform(&random, -40.0, 40.0)) / 8.0;
         there[k] = k % 4 == 3 ? here[k] : here[k] + far[k % 4];
     }
-    ovoid_mesh *a = mesh_atoms(*state, here, 10, 0.5, &options),
-               *b = mesh_atoms(*state, there, 10, 0.5, &options);
+    ovoid_mesh *a = mesh_atoms(*state, here, atoms, 0.5, &options),
+               *b = mesh_atoms(*state, there, atoms, 0.5, &options);
     assert_int_equal(ovoid_mesh_vertices(a), ovoid_mesh_vertices(b));
     assert_int_equal(ovoid_mesh_triangles(a), ovoid_mesh_triangles(b));
     for (size_t k = 0; k < 3 * ovoid_mesh_vertices(a); ++k)

@@ -372,7 +372,8 @@ static void spheres_and_ellipsoids_have_their_measures(void **state) {
 /* ---- shapes ------------------------------------------------------------------------------- */
 
 static void two_spheres(void **state) {
-    const ovoid_mesh_options options = options_of(1.0, coarse(0.4), OVOID_VERTEX_EXACT);
+    const ovoid_mesh_options options =
+        options_of(1.0, test_small() ? 1.0 : 0.4, OVOID_VERTEX_EXACT);
     const double touching[8] = {0.0, 0.0, 0.0, 1.5, 2.2, 1.1, 0.9, 1.5},
                  apart[8] = {0.0, 0.0, 0.0, 1.5, 5.2, 3.1, 2.9, 1.2};
     ovoid_mesh *mesh = expect_atoms(*state, touching, 2, 0.5, &options, 2, 1);
@@ -385,17 +386,19 @@ static void two_spheres(void **state) {
 }
 
 static void a_ring_has_a_hole(void **state) {
-    enum { RING = 14 };
-    double xyzr[4 * RING];
+    enum { MOST = 14 };
+    double xyzr[4 * MOST];
+    const size_t ring = test_size(MOST, 11);
+    const double wide = (double)ring / MOST;
     const ovoid_mesh_options options = options_of(1.0, coarse(0.5), OVOID_VERTEX_EXACT);
-    for (size_t i = 0; i < RING; ++i) {
-        const double angle = 2.0 * PI * (double)i / RING;
-        xyzr[4 * i] = 5.0 * cos(angle);
-        xyzr[4 * i + 1] = 4.0 * sin(angle) + 0.3 * cos(angle);
-        xyzr[4 * i + 2] = 3.0 * sin(angle);
+    for (size_t i = 0; i < ring; ++i) {
+        const double angle = 2.0 * PI * (double)i / (double)ring;
+        xyzr[4 * i] = 5.0 * wide * cos(angle);
+        xyzr[4 * i + 1] = wide * (4.0 * sin(angle) + 0.3 * cos(angle));
+        xyzr[4 * i + 2] = 3.0 * wide * sin(angle);
         xyzr[4 * i + 3] = 1.4;
     }
-    ovoid_mesh *mesh = expect_atoms(*state, xyzr, RING, 0.5, &options, 0, 1);
+    ovoid_mesh *mesh = expect_atoms(*state, xyzr, ring, 0.5, &options, 0, 1);
     assert_true(ovoid_mesh_volume(mesh) > 0.0);
     ovoid_mesh_destroy(&mesh);
 }

@@ -10,15 +10,12 @@ of the CSV. Fits run one after another; run nothing else beside them where the s
 """
 
 import argparse
-import csv
 import itertools
-import json
 import os
-import subprocess
 import sys
-import tempfile
 
-HERE = os.path.dirname(os.path.abspath(__file__))
+from common import find, paper_counts, report_of, short, write_table
+
 SPACINGS = (0.7, 0.8, 1.0, 1.25)
 PADDINGS = (2.0, 3.0, 4.0)
 COUNTS = (
@@ -31,28 +28,9 @@ TIMES = (
 ).split()
 
 
-def paper_counts():
-    with open(os.path.join(HERE, "paper_table1.csv"), encoding="utf-8") as lines:
-        rows = csv.DictReader(line for line in lines if not line.startswith("#"))
-        return {row["molecule"]: int(row["ellipsoids"]) for row in rows}
-
-
-def find(folder, name):
-    for extension in (".pqr", ".pqr.gz"):
-        path = os.path.join(folder, name + extension)
-        if os.path.exists(path):
-            return path
-    return None
-
-
 def fit(ovoid, path, options):
-    with tempfile.TemporaryDirectory() as folder:
-        report = os.path.join(folder, "report.json")
-        command = [ovoid, "fit", path, "--method", "l1", "--quiet", "--report", report]
-        command += ["-o", os.path.join(folder, "model.ovoid")] + options
-        subprocess.run(command, check=True)
-        with open(report, encoding="utf-8") as text:
-            return json.load(text)
+    command = ["fit", path, "--method", "l1", "--no-measure", "-o", os.devnull]
+    return report_of(ovoid, command + options)
 
 
 def row_of(name, report, paper):
@@ -60,18 +38,8 @@ def row_of(name, report, paper):
     for key in COUNTS + TIMES:
         if key not in row:
             value = report[key] if key in report else report["profile"][key]
-            row[key] = float(f"{value:.4g}") if isinstance(value, float) else value
+            row[key] = short(value)
     return row
-
-
-def write(path, device, version, columns, rows):
-    beside = path + ".part"
-    with open(beside, "w", encoding="utf-8", newline="") as out:
-        out.write(f"# ovoid {version}, {device}; bench/l1_counts.py\n")
-        table = csv.DictWriter(out, columns, extrasaction="ignore", lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
-    os.replace(beside, path)
 
 
 def main():
@@ -106,7 +74,8 @@ def main():
                   f"{row['max_error']:9.3f}{row['seconds']:9.1f}", flush=True)
     if arguments.output:
         columns = COUNTS if arguments.sweep else COUNTS + TIMES
-        write(arguments.output, report["device"], report["version"], columns, rows)
+        comment = f"ovoid {report['version']}, {report['device']}; bench/l1_counts.py"
+        write_table(arguments.output, comment, columns, rows)
 
 
 if __name__ == "__main__":

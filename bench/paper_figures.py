@@ -41,8 +41,8 @@ def save(figure, folder, name):
 
 
 def plain_log(axis):
-    """A logarithmic axis with 1, 2 and 5 of every decade written out."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    """A logarithmic axis with 1 and 3 of every decade written out."""
+    axis.set_major_locator(LogLocator(subs=(1, 3)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
@@ -176,21 +176,20 @@ def isovalues(folder, rows):
         top.set_yscale("log")
         plain_log(top.yaxis)
         bottom.set_yscale("symlog", linthresh=1)
-        bottom.set_ylim(-20, 20)
-        bottom.set_yticks((-20, -10, -5, -2, -1, 0, 1, 2, 5, 10, 20))
+        bottom.set_ylim(-40, 40)
+        bottom.set_yticks((-30, -10, -3, -1, -0.5, 0, 0.5, 1, 3, 10, 30))
         bottom.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:+g}" if v else "0"))
         bottom.minorticks_off()
         top.set_ylabel(f"{key} ({unit})")
         bottom.set_ylabel(f"model's {key} less the atoms' (%)")
         bottom.set_xlabel("isovalue $c$")
         bottom.set_xlim(right=max(r["isovalue"] for r in rows) + 0.25)
-    top, bottom = axes[0, 0], axes[1, 0]
-    top.plot([], [], color=GREY, linewidth=1.4, label="surface of the atoms")
-    top.plot([], [], "o", color=GREY, markerfacecolor="none", label="surface of the model")
-    top.legend(loc="center left", fontsize=9)
-    bottom.plot([], [], "o:", color=GREY, markerfacecolor="none", label="whole surface")
-    bottom.plot([], [], ".-", color=GREY, label="without walls of cavities")
-    bottom.legend(loc="lower left", fontsize=9)
+    for panel, kinds in zip(axes[:, 0], ((("-", "surface of the atoms"), ("o", "of the model")),
+                                         (("o:", "whole"), (".-", "without walls of cavities")))):
+        for style, label in kinds:
+            panel.plot([], [], style, color=GREY, markerfacecolor="none" if "o" in style else GREY,
+                       label=label)
+        panel.legend(loc="lower left", bbox_to_anchor=(0, 1), ncol=2, fontsize=9)
     save(figure, folder, "isovalues")
 
 

@@ -245,6 +245,9 @@ __kernel void march_triangles(const uint count, __global const uint4 *restrict l
  * they square it. */
 #define HALVED 64.0f
 
+/* A gradient is all rounding where phi changes by less than this share in a lattice step. */
+#define VANISHING 1e-5f
+
 /* Moves the vertices along their edges to where phi = c, by Newton's steps on ln phi, and by
  * halving the bracket where such a step would leave it. A step under `close` (in lattice steps) is
  * the last one: the error that it leaves is of the order of its square. With steps = 0 vertices
@@ -273,12 +276,11 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
         const ov_ivec axis = code >> 20 & 3, low_inside = (code >> 22 & 1) == 1;
         const ov_vec ux = axis == 0 ? one : zero, uy = axis == 1 ? one : zero,
                      uz = axis == 2 ? one : zero;
-        ov_vec s = OV_LOAD(place, ts), from = zero, to = one, gx, gy, gz;
+        ov_vec s = OV_LOAD(place, ts), from = zero, to = one, sum, gx, gy, gz;
         ov_ivec moving = s >= zero;
         for (uint step = 0;; ++step) {
             const ov_vec px = fma(s * h, ux, x0), py = fma(s * h, uy, y0), pz = fma(s * h, uz, z0);
-            ov_vec sum = 0.0f;
-            gx = gy = gz = zero;
+            sum = gx = gy = gz = zero;
             for (uint k = first; k < end; ++k) {
                 const ov_term term = terms[item[k]];
                 const ov_vec x = px - term.x, y = py - term.y, z = pz - term.z;
@@ -312,7 +314,7 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
                 break;
         }
         const ov_vec largest = max(fabs(gx), max(fabs(gy), fabs(gz)));
-        const ov_ivec usable = largest > zero && largest < INFINITY;
+        const ov_ivec usable = largest * h > VANISHING * sum && largest < INFINITY;
         const ov_vec scale = usable ? one / largest : zero;
         gx *= scale;
         gy *= scale;

@@ -4,7 +4,7 @@
  * Everything is in the frame of the camera: x to the right, y up, z toward the eye, angstrom. Ray
  * (column, row) runs down z at x = left + column * spacing, y = top - row * spacing. The rays of a
  * pack are a block of OV_BLOCK_X columns and OV_BLOCK_Y rows, blocks row by row; everything that is
- * kept per ray is stored in that order.
+ * kept per ray is stored in that order. A work-item follows one vector of a pack.
  *
  * Space is cut into boxes: a tile of tile * tile rays, and of the depth a slab of OV_STEPS steps.
  * start, item: the terms that reach box b are item[start[b]] .. item[start[b + 1] - 1], where b is
@@ -17,6 +17,9 @@
 #error "a block of rays is a pack"
 #endif
 #define OV_STEPS 4
+/* Vectors of rays in a pack, a work-item each. Several in one would share nothing, and some drivers
+ * bound the rounds of a work-item's loops: llvmpipe's (Mesa 22.3) end after 65535 altogether. */
+#define OV_PARTS (OV_PACK / OV_VECTOR)
 /* Depth of a ray that meets nothing. */
 #define OV_NOWHERE (-1e30f)
 /* Newton steps within a bracket of at most one step. */
@@ -161,70 +164,67 @@ __kernel void trace(const uint packs, const uint blocks, const uint tile, const 
                     __global const uint *restrict item, __global const ov_term *restrict terms,
                     __global float *restrict depth, __global int *restrict normal,
                     __global float *restrict slope) {
-    const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
+    const uint pack = get_global_id(0) / OV_PARTS, part = get_global_id(0) % OV_PARTS;
     if (pack >= packs)
         return;
     const uint column = pack % blocks * OV_BLOCK_X, row = pack / blocks * OV_BLOCK_Y;
     __global const uint *const boxes =
         box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
-    for (uint v = 0; v < OV_VECTORS; ++v) {
-        const ov_vec x =
-            left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
-        const ov_vec y = top - ((float)row + OV_LOAD(v * OV_LANES + lane, ov_block_y)) * spacing;
-        ov_vec z = OV_NOWHERE, nx = 0.0f, ny = 0.0f, nz = 0.0f;
-        ov_vec before = 0.0f, before_growth = 0.0f;
-        ov_ivec open = -1;
-        for (uint slab = 0; slab < slabs && OV_ANY(open); ++slab) {
-            const ov_box_terms list = ov_terms_of(start, item, terms, boxes[slab]);
-            if (list.first == list.end) {
-                before = before_growth = 0.0f;
-                continue;
-            }
-            const float z0 = front - (float)(slab * OV_STEPS) * step;
-            ov_vec value[OV_STEPS], growth[OV_STEPS];
-            ov_march(list, x, y, z0, step, value, growth);
-            ov_bracket bracket = {z0, z0, 0.0f, 1.0f};
-            ov_ivec caught = 0;
-            for (uint s = 0; s < OV_STEPS; ++s) {
-                const float above = z0 - (float)s * step, here = z0 - (float)(s + 1) * step;
-                const ov_ivec free = open & ~caught;
-                const ov_ivec inside = free & OV_MASK(value[s] >= level);
-                ov_catch(&bracket, inside, above, before, here, value[s]);
-                caught |= inside;
-                /* Up and down again: how high at most, by the tangents at both ends? */
-                const ov_vec bend = before_growth - growth[s];
-                const ov_vec crest =
-                    before + before_growth * (value[s] - before - growth[s] * step) / bend;
-                const ov_ivec peak = free & ~inside & OV_MASK(before_growth > 0.0f) &
-                                     OV_MASK(growth[s] < 0.0f) & OV_MASK(crest >= level);
-                if (OV_ANY(peak)) {
-                    const ov_vec summit =
-                        above - select((ov_vec)0.0f, step * before_growth / bend, peak);
-                    ov_vec height, unused;
-                    ov_along(list, x, y, summit, &height, &unused);
-                    const ov_ivec reached = peak & OV_MASK(height >= level);
-                    ov_catch(&bracket, reached, above, before, summit, height);
-                    caught |= reached;
-                }
-                before = value[s];
-                before_growth = growth[s];
-            }
-            if (!OV_ANY(caught))
-                continue;
-            const ov_vec found = ov_refine(list, x, y, level, bracket);
-            ov_vec dx, dy, dz;
-            ov_descent(list, x, y, found, &dx, &dy, &dz);
-            z = select(z, found, caught);
-            nx = select(nx, dx, caught);
-            ny = select(ny, dy, caught);
-            nz = select(nz, dz, caught);
-            open &= ~caught;
+    const ov_vec x = left + ((float)column + OV_LOAD(part, ov_block_x)) * spacing;
+    const ov_vec y = top - ((float)row + OV_LOAD(part, ov_block_y)) * spacing;
+    ov_vec z = OV_NOWHERE, nx = 0.0f, ny = 0.0f, nz = 0.0f;
+    ov_vec before = 0.0f, before_growth = 0.0f;
+    ov_ivec open = -1;
+    for (uint slab = 0; slab < slabs && OV_ANY(open); ++slab) {
+        const ov_box_terms list = ov_terms_of(start, item, terms, boxes[slab]);
+        if (list.first == list.end) {
+            before = before_growth = 0.0f;
+            continue;
         }
-        const size_t base = (size_t)pack * OV_PACK;
-        OV_STORE(z, v * OV_LANES + lane, depth + base);
-        OV_STORE(ov_pack_normal(nx, ny, nz), v * OV_LANES + lane, normal + base);
-        OV_STORE(sqrt(fma(nx, nx, fma(ny, ny, nz * nz))), v * OV_LANES + lane, slope + base);
+        const float z0 = front - (float)(slab * OV_STEPS) * step;
+        ov_vec value[OV_STEPS], growth[OV_STEPS];
+        ov_march(list, x, y, z0, step, value, growth);
+        ov_bracket bracket = {z0, z0, 0.0f, 1.0f};
+        ov_ivec caught = 0;
+        for (uint s = 0; s < OV_STEPS; ++s) {
+            const float above = z0 - (float)s * step, here = z0 - (float)(s + 1) * step;
+            const ov_ivec free = open & ~caught;
+            const ov_ivec inside = free & OV_MASK(value[s] >= level);
+            ov_catch(&bracket, inside, above, before, here, value[s]);
+            caught |= inside;
+            /* Up and down again: how high at most, by the tangents at both ends? */
+            const ov_vec bend = before_growth - growth[s];
+            const ov_vec crest =
+                before + before_growth * (value[s] - before - growth[s] * step) / bend;
+            const ov_ivec peak = free & ~inside & OV_MASK(before_growth > 0.0f) &
+                                 OV_MASK(growth[s] < 0.0f) & OV_MASK(crest >= level);
+            if (OV_ANY(peak)) {
+                const ov_vec summit =
+                    above - select((ov_vec)0.0f, step * before_growth / bend, peak);
+                ov_vec height, unused;
+                ov_along(list, x, y, summit, &height, &unused);
+                const ov_ivec reached = peak & OV_MASK(height >= level);
+                ov_catch(&bracket, reached, above, before, summit, height);
+                caught |= reached;
+            }
+            before = value[s];
+            before_growth = growth[s];
+        }
+        if (!OV_ANY(caught))
+            continue;
+        const ov_vec found = ov_refine(list, x, y, level, bracket);
+        ov_vec dx, dy, dz;
+        ov_descent(list, x, y, found, &dx, &dy, &dz);
+        z = select(z, found, caught);
+        nx = select(nx, dx, caught);
+        ny = select(ny, dy, caught);
+        nz = select(nz, dz, caught);
+        open &= ~caught;
     }
+    const size_t base = (size_t)pack * OV_PACK;
+    OV_STORE(z, part, depth + base);
+    OV_STORE(ov_pack_normal(nx, ny, nz), part, normal + base);
+    OV_STORE(sqrt(fma(nx, nx, fma(ny, ny, nz * nz))), part, slope + base);
 }
 
 /* As trace(), for the terms as ellipsoids of their own: the surface q = reach of each. term: which
@@ -236,47 +236,44 @@ trace_ellipsoids(const uint packs, const uint blocks, const uint tile, const uin
                  __global const uint *restrict start, __global const uint *restrict item,
                  __global const ov_term *restrict terms, __global float *restrict depth,
                  __global int *restrict normal, __global int *restrict term) {
-    const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
+    const uint pack = get_global_id(0) / OV_PARTS, part = get_global_id(0) % OV_PARTS;
     if (pack >= packs)
         return;
     const uint column = pack % blocks * OV_BLOCK_X, row = pack / blocks * OV_BLOCK_Y;
     __global const uint *const boxes =
         box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
-    for (uint v = 0; v < OV_VECTORS; ++v) {
-        const ov_vec x =
-            left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
-        const ov_vec y = top - ((float)row + OV_LOAD(v * OV_LANES + lane, ov_block_y)) * spacing;
-        ov_vec z = OV_NOWHERE, nx = 0.0f, ny = 0.0f, nz = 0.0f;
-        ov_ivec which = 0, open = -1;
-        for (uint slab = 0; slab < slabs && OV_ANY(open); ++slab) {
-            const ov_box_terms list = ov_terms_of(start, item, terms, boxes[slab]);
-            const float bottom = front - (float)((slab + 1) * OV_STEPS) * step;
-            for (uint k = list.first; k < list.end; ++k) {
-                const ov_term t = terms[item[k]];
-                const ov_vec dx = x - t.x, dy = y - t.y;
-                const ov_vec flat = fma(dx, fma(dy, (ov_vec)(t.xy), dx * t.xx), dy * (dy * t.yy));
-                const ov_vec tilt = fma(dx, (ov_vec)(t.xz), dy * t.yz);
-                const ov_vec under = fma(tilt, tilt, 4.0f * t.zz * (t.reach - flat));
-                const ov_vec dz = (sqrt(max(under, 0.0f)) - tilt) / (2.0f * t.zz);
-                const ov_vec met = dz + t.z;
-                /* What lies below the slab waits for its own: another term may come before it. */
-                const ov_ivec nearer =
-                    open & OV_MASK(under >= 0.0f) & OV_MASK(met >= bottom) & OV_MASK(met > z);
-                z = select(z, met, nearer);
-                nx = select(nx, fma(dx, (ov_vec)(2.0f * t.xx), fma(dy, (ov_vec)(t.xy), dz * t.xz)),
-                            nearer);
-                ny = select(ny, fma(dy, (ov_vec)(2.0f * t.yy), fma(dx, (ov_vec)(t.xy), dz * t.yz)),
-                            nearer);
-                nz = select(nz, fma(dz, (ov_vec)(2.0f * t.zz), tilt), nearer);
-                which = select(which, (ov_ivec)((int)item[k]), nearer);
-            }
-            open &= OV_MASK(z == OV_NOWHERE);
+    const ov_vec x = left + ((float)column + OV_LOAD(part, ov_block_x)) * spacing;
+    const ov_vec y = top - ((float)row + OV_LOAD(part, ov_block_y)) * spacing;
+    ov_vec z = OV_NOWHERE, nx = 0.0f, ny = 0.0f, nz = 0.0f;
+    ov_ivec which = 0, open = -1;
+    for (uint slab = 0; slab < slabs && OV_ANY(open); ++slab) {
+        const ov_box_terms list = ov_terms_of(start, item, terms, boxes[slab]);
+        const float bottom = front - (float)((slab + 1) * OV_STEPS) * step;
+        for (uint k = list.first; k < list.end; ++k) {
+            const ov_term t = terms[item[k]];
+            const ov_vec dx = x - t.x, dy = y - t.y;
+            const ov_vec flat = fma(dx, fma(dy, (ov_vec)(t.xy), dx * t.xx), dy * (dy * t.yy));
+            const ov_vec tilt = fma(dx, (ov_vec)(t.xz), dy * t.yz);
+            const ov_vec under = fma(tilt, tilt, 4.0f * t.zz * (t.reach - flat));
+            const ov_vec dz = (sqrt(max(under, 0.0f)) - tilt) / (2.0f * t.zz);
+            const ov_vec met = dz + t.z;
+            /* What lies below the slab waits for its own: another term may come before it. */
+            const ov_ivec nearer =
+                open & OV_MASK(under >= 0.0f) & OV_MASK(met >= bottom) & OV_MASK(met > z);
+            z = select(z, met, nearer);
+            nx = select(nx, fma(dx, (ov_vec)(2.0f * t.xx), fma(dy, (ov_vec)(t.xy), dz * t.xz)),
+                        nearer);
+            ny = select(ny, fma(dy, (ov_vec)(2.0f * t.yy), fma(dx, (ov_vec)(t.xy), dz * t.yz)),
+                        nearer);
+            nz = select(nz, fma(dz, (ov_vec)(2.0f * t.zz), tilt), nearer);
+            which = select(which, (ov_ivec)((int)item[k]), nearer);
         }
-        const size_t base = (size_t)pack * OV_PACK;
-        OV_STORE(z, v * OV_LANES + lane, depth + base);
-        OV_STORE(ov_pack_normal(nx, ny, nz), v * OV_LANES + lane, normal + base);
-        OV_STORE(which, v * OV_LANES + lane, term + base);
+        open &= OV_MASK(z == OV_NOWHERE);
     }
+    const size_t base = (size_t)pack * OV_PACK;
+    OV_STORE(z, part, depth + base);
+    OV_STORE(ov_pack_normal(nx, ny, nz), part, normal + base);
+    OV_STORE(which, part, term + base);
 }
 
 /* At the points found by trace(): how far outside them the other field's surface lies to first
@@ -288,40 +285,37 @@ __kernel void compare(const uint packs, const uint blocks, const uint tile, cons
                       __global const uint *restrict box_of, __global const uint *restrict start,
                       __global const uint *restrict item, __global const ov_term *restrict terms,
                       __global const float *restrict depth, __global float *restrict slope) {
-    const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
+    const uint pack = get_global_id(0) / OV_PARTS, part = get_global_id(0) % OV_PARTS;
     if (pack >= packs)
         return;
     const uint column = pack % blocks * OV_BLOCK_X, row = pack / blocks * OV_BLOCK_Y;
     __global const uint *const boxes =
         box_of + (size_t)(row / tile * tiles + column / tile) * slabs;
     const size_t base = (size_t)pack * OV_PACK;
-    for (uint v = 0; v < OV_VECTORS; ++v) {
-        const ov_vec x =
-            left + ((float)column + OV_LOAD(v * OV_LANES + lane, ov_block_x)) * spacing;
-        const ov_vec y = top - ((float)row + OV_LOAD(v * OV_LANES + lane, ov_block_y)) * spacing;
-        const ov_vec z = OV_LOAD(v * OV_LANES + lane, depth + base);
-        const ov_vec steep = OV_LOAD(v * OV_LANES + lane, slope + base);
-        const ov_ivec seen = OV_MASK(z > OV_NOWHERE);
-        const ov_vec place = clamp((front - z) / (OV_STEPS * step), -1.0f, (float)slabs);
-        const ov_ivec slab_of = select((ov_ivec)-1, OV_TO_INT(floor(place)), seen);
-        ov_vec sum = 0.0f;
-        int own[OV_VECTOR], low = (int)slabs, high = -1;
-        OV_STORE(slab_of, 0, own);
-        for (uint k = 0; k < OV_VECTOR; ++k) {
-            low = own[k] >= 0 ? min(low, own[k]) : low;
-            high = max(high, min(own[k], (int)slabs - 1));
-        }
-        for (int slab = low; slab <= high; ++slab) {
-            const ov_ivec here = OV_MASK(slab_of == slab);
-            if (!OV_ANY(here))
-                continue;
-            ov_vec value, unused;
-            ov_along(ov_terms_of(start, item, terms, boxes[slab]), x, y, z, &value, &unused);
-            sum = select(sum, value, here);
-        }
-        const ov_vec distance = (sum - level) / max(steep, 1e-6f);
-        OV_STORE(select((ov_vec)0.0f, distance, seen), v * OV_LANES + lane, slope + base);
+    const ov_vec x = left + ((float)column + OV_LOAD(part, ov_block_x)) * spacing;
+    const ov_vec y = top - ((float)row + OV_LOAD(part, ov_block_y)) * spacing;
+    const ov_vec z = OV_LOAD(part, depth + base);
+    const ov_vec steep = OV_LOAD(part, slope + base);
+    const ov_ivec seen = OV_MASK(z > OV_NOWHERE);
+    const ov_vec place = clamp((front - z) / (OV_STEPS * step), -1.0f, (float)slabs);
+    const ov_ivec slab_of = select((ov_ivec)-1, OV_TO_INT(floor(place)), seen);
+    ov_vec sum = 0.0f;
+    int own[OV_VECTOR], low = (int)slabs, high = -1;
+    OV_STORE(slab_of, 0, own);
+    for (uint k = 0; k < OV_VECTOR; ++k) {
+        low = own[k] >= 0 ? min(low, own[k]) : low;
+        high = max(high, min(own[k], (int)slabs - 1));
     }
+    for (int slab = low; slab <= high; ++slab) {
+        const ov_ivec here = OV_MASK(slab_of == slab);
+        if (!OV_ANY(here))
+            continue;
+        ov_vec value, unused;
+        ov_along(ov_terms_of(start, item, terms, boxes[slab]), x, y, z, &value, &unused);
+        sum = select(sum, value, here);
+    }
+    const ov_vec distance = (sum - level) / max(steep, 1e-6f);
+    OV_STORE(select((ov_vec)0.0f, distance, seen), part, slope + base);
 }
 
 /* Glass over a surface: angstrom over which it begins where both cross, and over which what lies

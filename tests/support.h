@@ -39,6 +39,10 @@ int test_close(void **state);
 /* Allocates or aborts; free with free(). Zeroed. */
 void *test_alloc(size_t count, size_t size);
 
+/* PyMOL, for a shell. Debian's script starts it with the first python3 there is, which has to be
+ * Debian's. */
+#define TEST_PYMOL "PATH=/usr/bin:\"$PATH\" pymol"
+
 /* ---- random numbers (splitmix64) ---------------------------------------------------------- */
 
 typedef struct test_random {

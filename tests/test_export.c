@@ -244,7 +244,7 @@ static void pymol_script_draws_the_ellipsoids(void **state) {
 }
 
 static void pymol_opens_it(void **state) {
-    if (system("pymol -cq -d quit >/dev/null 2>&1") != 0) {
+    if (system(TEST_PYMOL " -cq -d quit >/dev/null 2>&1") != 0) {
         print_message("no program pymol here (Debian: pymol)\n");
         skip();
     }
@@ -258,8 +258,8 @@ static void pymol_opens_it(void **state) {
     free(export_text(*state, model, "m.py", NULL));
     const char *driver = scratch_path(*state, "show.py");
     scratch_write(driver, show, sizeof show - 1);
-    snprintf(command, sizeof command, "pymol -cqk '%s' '%s' 2>&1", scratch_path(*state, "m.py"),
-             driver);
+    snprintf(command, sizeof command, TEST_PYMOL " -cqk '%s' '%s' 2>&1",
+             scratch_path(*state, "m.py"), driver);
     char *text = output_of(command), *at = strstr(text, "EXTENT");
     if (!at)
         fail_msg("PyMOL says:\n%s", text);
@@ -458,6 +458,7 @@ static void failures_leave_nothing(void **state) {
         const char *path = scratch_path(s, names[i]);
         if (access("/dev/full", W_OK) != 0 || symlink("/dev/full", path) != 0) {
             print_message("no /dev/full here\n");
+            ovoid_model_destroy(&model);
             skip();
         }
         test_refused(context, ovoid_model_export(context, model, path, NULL), OVOID_ERROR_IO,

@@ -8,8 +8,8 @@ static ovoid_fit_options short_options(void) {
         .isovalue = 1.0,
         .spacing = test_size(80, 180) / 100.0,
         .padding = 2.0,
-        .l1 = {.iterations = (uint32_t)test_size(60, 6),
-               .sparse_iterations = (uint32_t)test_size(40, 4),
+        .l1 = {.iterations = (uint32_t)test_size(60, 4),
+               .sparse_iterations = (uint32_t)test_size(40, 3),
                .epsilon = 0.05,
                .max_error = 0.5,
                .prune_below = 1e-3,
@@ -114,7 +114,7 @@ static double fit_one(ovoid_context *context, const ovoid_molecule *molecule,
 }
 
 static void result_is_consistent(void **state) {
-    ovoid_molecule *molecule = random_molecule(*state, test_size(40, 5), 1);
+    ovoid_molecule *molecule = random_molecule(*state, test_size(40, 4), 1);
     ovoid_fit_options options = short_options();
     fit_one(*state, molecule, &options);
     options.isovalue = 1.3;
@@ -152,10 +152,10 @@ static void odd_molecules(void **state) {
 /* ---- the same bits ------------------------------------------------------------------------ */
 
 static void two_fits_give_the_same_bits(void **state) {
-    ovoid_molecule *molecule = random_molecule(*state, test_size(60, 5), 2);
+    ovoid_molecule *molecule = random_molecule(*state, test_size(60, 4), 2);
     ovoid_fit_options options = short_options();
     options.l1.prune_below = 1.6; /* so that pruning takes part */
-    options.l1.prune_every = 5;
+    options.l1.prune_every = (uint32_t)test_size(5, 3);
     ovoid_model *models[3] = {0};
     for (int n = 0; n < 3; ++n) {
         ovoid_context *other = NULL;

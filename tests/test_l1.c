@@ -158,10 +158,14 @@ static void starts_with_the_atoms(void **state) {
 
 /* X' = X - tau grad (w_s E_s + w_l E_l1), the gradient from central differences of the paper's
  * formulas in double. X and X' come from two fits that differ by one iteration. */
-static void expect_step(ovoid_context *context, uint32_t sparse_iterations, uint32_t iterations) {
+static void expect_step(ovoid_context *context, ovoid_kernel kernel, uint32_t sparse_iterations,
+                        uint32_t iterations) {
     fit_run before, after;
     double *xyz, *target;
+    const bool spheres = kernel == OVOID_KERNEL_SPHERE; /* their amplitudes alone move */
+    const size_t moving = spheres ? 1 : 10, penalised = spheres ? 1 : 4;
     ovoid_fit_options options = options_for(NULL, sparse_iterations, iterations);
+    options.l1.kernel = kernel;
     options.l1.prune_every = UINT32_MAX;
     options.l1.epsilon = 0.5;
     run_fit(context, clump, ATOMS, &options, &before);
@@ -187,13 +191,15 @@ static void expect_step(ovoid_context *context, uint32_t sparse_iterations, uint
         x[j] = middle - h;
         const double down = reference_accuracy(x, ATOMS, xyz, target, points);
         x[j] = middle;
-        const double accuracy = step->accuracy_weight * (up - down) / (2.0 * h);
-        gradient[j] = accuracy + (j % 10 < 4 ? step->sparse_weight * (x[j] > 0.0 ? 1.0 : -1.0) : 0);
+        const double accuracy =
+            j % 10 < moving ? step->accuracy_weight * (up - down) / (2.0 * h) : 0.0;
+        gradient[j] =
+            accuracy + (j % 10 < penalised ? step->sparse_weight * (x[j] > 0.0 ? 1.0 : -1.0) : 0);
         largest = fmax(largest, fabs(gradient[j]));
         largest_accuracy = fmax(largest_accuracy, fabs(accuracy));
     }
-    print_message("%s step %.3g: largest derivative %.3g, of w_s E_s alone %.3g\n", step->stage,
-                  step->step, largest, largest_accuracy);
+    print_message("%s%s step %.3g: largest derivative %.3g, of w_s E_s alone %.3g\n", step->stage,
+                  spheres ? " spheres'" : "", step->step, largest, largest_accuracy);
     assert_true(largest_accuracy > 0.1 * largest);
     for (size_t j = 0; j < 10 * ATOMS; ++j) {
         char what[64];
@@ -209,14 +215,53 @@ static void expect_step(ovoid_context *context, uint32_t sparse_iterations, uint
 }
 
 static void steps_along_the_gradient(void **state) {
-    const uint32_t some = (uint32_t)test_size(30, 4);
-    expect_step(*state, some, some);     /* sparse */
-    expect_step(*state, some, some + 3); /* accuracy */
+    const uint32_t some = (uint32_t)test_size(30, 2), more = (uint32_t)test_size(33, 3);
+    const ovoid_kernel kernels[] = {OVOID_KERNEL_ELLIPSOID, OVOID_KERNEL_SPHERE};
+    for (size_t k = 0; k < 2; ++k) {
+        expect_step(*state, kernels[k], some, some); /* sparse */
+        expect_step(*state, kernels[k], some, more); /* accuracy */
+    }
+}
+
+/* Spheres stay where their atoms are, as wide as they were and without direction, however many
+ * iterations there are: only amplitudes move. E_l1 is the sum of their roots. */
+static void spheres_change_amplitudes_alone(void **state) {
+    fit_run run;
+    double moved = 0.0, sparse = 0.0;
+    ovoid_fit_options options =
+        options_for(NULL, (uint32_t)test_size(200, 6), (uint32_t)test_size(240, 8));
+    options.l1.kernel = OVOID_KERNEL_SPHERE;
+    options.l1.prune_below = 1.0; /* so that some are deleted */
+    options.l1.prune_every = (uint32_t)test_size(20, 3);
+    run_fit(*state, clump, ATOMS, &options, &run);
+    const ovoid_ellipsoid *const e = ovoid_model_ellipsoids(run.model);
+    const size_t count = ovoid_model_size(run.model);
+    size_t atom = 0;
+    for (size_t i = 0; i < count; ++i, ++atom) {
+        while (atom < ATOMS && e[i].centre[0] != clump[4 * atom])
+            ++atom; /* was deleted */
+        assert_true(atom < ATOMS);
+        for (size_t k = 0; k < 3; ++k) {
+            assert_true(e[i].centre[k] == clump[4 * atom + k]);
+            expect_near(e[i].decay[k], 0.5, 1e-15, "a decay");
+            assert_true(e[i].angle[k] == 0.0);
+        }
+        const double root = sqrt(e[i].amplitude), radius = clump[4 * atom + 3];
+        moved = fmax(moved, fabs(root - exp(0.25 * radius * radius)));
+        sparse += root;
+    }
+    print_message("%zu of %d spheres are left, the largest change of a root is %.3g\n", count,
+                  ATOMS, moved);
+    assert_true(moved > 0.01);
+    if (!test_small())
+        assert_true(count < ATOMS);
+    expect_near(run.trace.records[run.trace.count - 1].sparse_term, sparse, 1e-12 * sparse, "E_l1");
+    destroy_run(&run);
 }
 
 /* Every record's weights follow from the record before, and the objective from the weights. */
 static void weights_follow_the_algorithm(void **state) {
-    const uint32_t sparse = (uint32_t)test_size(100, 8), all = (uint32_t)test_size(140, 11);
+    const uint32_t sparse = (uint32_t)test_size(100, 5), all = (uint32_t)test_size(140, 7);
     fit_run run;
     size_t gated = 0, bounded = 0, balanced = 0;
     ovoid_fit_options options = options_for(NULL, sparse, all);
@@ -265,7 +310,7 @@ static void gate_can_be_open_or_shut(void **state) {
     for (size_t n = 0; n < 2; ++n) {
         fit_run run;
         ovoid_fit_options options =
-            options_for(NULL, (uint32_t)test_size(40, 4), (uint32_t)test_size(40, 4));
+            options_for(NULL, (uint32_t)test_size(40, 3), (uint32_t)test_size(40, 3));
         options.l1.max_error = gates[n];
         run_fit(*state, clump, ATOMS, &options, &run);
         /* from the second on: the start may be exact */
@@ -279,7 +324,7 @@ static void gate_can_be_open_or_shut(void **state) {
 /* A step that is taken lowers the objective, under the weights of its own iteration. In the
  * accuracy phase these do not change, so there the objective never rises. */
 static void accepted_steps_descend(void **state) {
-    const uint32_t sparse = (uint32_t)test_size(120, 6), all = (uint32_t)test_size(300, 10);
+    const uint32_t sparse = (uint32_t)test_size(120, 3), all = (uint32_t)test_size(300, 5);
     const ovoid_first_step first_steps[] = {OVOID_FIRST_STEP_SECANT, OVOID_FIRST_STEP_GROW};
     for (size_t which = 0; which < 2; ++which) {
         fit_run run;
@@ -311,8 +356,8 @@ static void accepted_steps_descend(void **state) {
 static void pruning_keeps_its_schedule(void **state) {
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(30, 14), (uint32_t)test_size(30, 14));
-    options.l1.prune_every = 7;
+        options_for(NULL, (uint32_t)test_size(30, 6), (uint32_t)test_size(30, 6));
+    options.l1.prune_every = (uint32_t)test_size(7, 3);
     options.l1.prune_below = 1.3; /* c begins between 1.28 and 2.06, and the L1 term lowers it */
     options.l1.max_error = INFINITY;
     run_fit(*state, clump, ATOMS, &options, &run);
@@ -322,7 +367,7 @@ static void pruning_keeps_its_schedule(void **state) {
         const ovoid_progress *const now = &run.trace.records[n];
         assert_true(now->ellipsoids <= before);
         if (now->ellipsoids < before) {
-            assert_int_equal(now->iteration % 7, 0);
+            assert_int_equal(now->iteration % options.l1.prune_every, 0);
             ++losses;
         }
         before = now->ellipsoids;
@@ -375,7 +420,7 @@ static void pruning_leaves_one(void **state) {
 static void sparse_phase_shrinks_the_l1_term(void **state) {
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(200, 8), (uint32_t)test_size(200, 8));
+        options_for(NULL, (uint32_t)test_size(200, 4), (uint32_t)test_size(200, 4));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const first = &run.trace.records[0];
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
@@ -406,7 +451,7 @@ static void ends_where_nothing_changes(void **state) {
 static void result_is_the_last_record(void **state) {
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(30, 5), (uint32_t)test_size(50, 9));
+        options_for(NULL, (uint32_t)test_size(30, 3), (uint32_t)test_size(50, 5));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
     const ovoid_fit_result *const result = &run.result;
@@ -435,6 +480,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(starts_with_the_atoms),
         cmocka_unit_test(steps_along_the_gradient),
+        cmocka_unit_test(spheres_change_amplitudes_alone),
         cmocka_unit_test(weights_follow_the_algorithm),
         cmocka_unit_test(gate_can_be_open_or_shut),
         cmocka_unit_test(accepted_steps_descend),

@@ -464,7 +464,7 @@ static void pymol_opens_it(void **state) {
         "print('VALUE', field[tuple(at)])\n";
     if (test_small())
         skip();
-    if (system("pymol -cq -d quit >/dev/null 2>&1") != 0) {
+    if (system(TEST_PYMOL " -cq -d quit >/dev/null 2>&1") != 0) {
         print_message("no program pymol here (Debian: pymol)\n");
         skip();
     }
@@ -481,7 +481,7 @@ static void pymol_opens_it(void **state) {
         map m = load(&formats[i], path);
         /* Maps as they are, not scaled to their deviation. */
         snprintf(command, sizeof command,
-                 "pymol -cqk -d 'set normalize_ccp4_maps, 0; load %s, m; run %s' 2>&1", path,
+                 TEST_PYMOL " -cqk -d 'set normalize_ccp4_maps, 0; load %s, m; run %s' 2>&1", path,
                  scratch_path(*state, "show.py"));
         char *text = output_of(command);
         double extent[6], shape[3], value;

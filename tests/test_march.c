@@ -372,7 +372,8 @@ static void spheres_and_ellipsoids_have_their_measures(void **state) {
 /* ---- shapes ------------------------------------------------------------------------------- */
 
 static void two_spheres(void **state) {
-    const ovoid_mesh_options options = options_of(1.0, coarse(0.4), OVOID_VERTEX_EXACT);
+    const ovoid_mesh_options options =
+        options_of(1.0, test_small() ? 1.0 : 0.4, OVOID_VERTEX_EXACT);
     const double touching[8] = {0.0, 0.0, 0.0, 1.5, 2.2, 1.1, 0.9, 1.5},
                  apart[8] = {0.0, 0.0, 0.0, 1.5, 5.2, 3.1, 2.9, 1.2};
     ovoid_mesh *mesh = expect_atoms(*state, touching, 2, 0.5, &options, 2, 1);
@@ -385,35 +386,39 @@ static void two_spheres(void **state) {
 }
 
 static void a_ring_has_a_hole(void **state) {
-    enum { RING = 14 };
-    double xyzr[4 * RING];
+    enum { MOST = 14 };
+    double xyzr[4 * MOST];
+    const size_t ring = test_size(MOST, 11);
+    const double wide = (double)ring / MOST;
     const ovoid_mesh_options options = options_of(1.0, coarse(0.5), OVOID_VERTEX_EXACT);
-    for (size_t i = 0; i < RING; ++i) {
-        const double angle = 2.0 * PI * (double)i / RING;
-        xyzr[4 * i] = 5.0 * cos(angle);
-        xyzr[4 * i + 1] = 4.0 * sin(angle) + 0.3 * cos(angle);
-        xyzr[4 * i + 2] = 3.0 * sin(angle);
+    for (size_t i = 0; i < ring; ++i) {
+        const double angle = 2.0 * PI * (double)i / (double)ring;
+        xyzr[4 * i] = 5.0 * wide * cos(angle);
+        xyzr[4 * i + 1] = wide * (4.0 * sin(angle) + 0.3 * cos(angle));
+        xyzr[4 * i + 2] = 3.0 * wide * sin(angle);
         xyzr[4 * i + 3] = 1.4;
     }
-    ovoid_mesh *mesh = expect_atoms(*state, xyzr, RING, 0.5, &options, 0, 1);
+    ovoid_mesh *mesh = expect_atoms(*state, xyzr, ring, 0.5, &options, 0, 1);
     assert_true(ovoid_mesh_volume(mesh) > 0.0);
     ovoid_mesh_destroy(&mesh);
 }
 
 /* Atoms on a sphere: an outer wall and that of the cavity, whose volume counts negative. */
 static void a_hollow_shell_has_two_walls(void **state) {
-    enum { SHELL = 120 };
-    double xyzr[4 * SHELL];
+    enum { MOST = 120 };
+    double xyzr[4 * MOST];
+    const size_t shell = test_size(MOST, 56);
+    const double wide = 5.0 * sqrt((double)shell / MOST);
     const ovoid_mesh_options options = options_of(1.0, coarse(0.5), OVOID_VERTEX_EXACT);
-    for (size_t i = 0; i < SHELL; ++i) {
-        const double z = (2.0 * (double)i + 1.0) / SHELL - 1.0,
+    for (size_t i = 0; i < shell; ++i) {
+        const double z = (2.0 * (double)i + 1.0) / (double)shell - 1.0,
                      angle = PI * (3.0 - sqrt(5.0)) * (double)i;
-        xyzr[4 * i] = 5.0 * sqrt(1.0 - z * z) * cos(angle);
-        xyzr[4 * i + 1] = 5.0 * sqrt(1.0 - z * z) * sin(angle);
-        xyzr[4 * i + 2] = 5.0 * z;
+        xyzr[4 * i] = wide * sqrt(1.0 - z * z) * cos(angle);
+        xyzr[4 * i + 1] = wide * sqrt(1.0 - z * z) * sin(angle);
+        xyzr[4 * i + 2] = wide * z;
         xyzr[4 * i + 3] = 1.2;
     }
-    ovoid_mesh *mesh = expect_atoms(*state, xyzr, SHELL, 0.7, &options, 4, 2);
+    ovoid_mesh *mesh = expect_atoms(*state, xyzr, shell, 0.7, &options, 4, 2);
     const ovoid_component *const a = ovoid_mesh_component(mesh, 0), *const b = ovoid_mesh_component(
                                                                         mesh, 1);
     assert_true(a->outer != b->outer);
@@ -453,18 +458,25 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
     test_check(*state, ovoid_molecule_create(*state, xyzr, 2, &molecule));
     test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, origin, 1, &c, NULL));
     for (int rule = 0; rule < 2; ++rule) {
-        const ovoid_mesh_options options = options_of(c, 0.5, (ovoid_vertex_rule)rule);
+        const ovoid_mesh_options options = options_of(c, coarse(0.5), (ovoid_vertex_rule)rule);
         size_t at_origin = 0;
+        double sum[3] = {0};
         test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
         expect_closed(mesh);
         for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
             const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
             const float *const n = ovoid_mesh_normals(mesh) + 3 * v;
-            at_origin += y[0] == 0.0 && y[1] == 0.0 && y[2] == 0.0;
+            if (y[0] == 0.0 && y[1] == 0.0 && y[2] == 0.0) {
+                ++at_origin;
+                for (int k = 0; k < 3; ++k)
+                    sum[k] += n[k];
+            }
             expect_near((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2], 1.0, 1e-5,
                         "a normal's square");
         }
         assert_int_equal(at_origin, 4); /* the origin is inside: on the edges up and down from it */
+        for (int k = 0; k < 3; ++k)
+            expect_near(sum[k], 0.0, 2.0, "the sum of four normals that face all ways");
         ovoid_mesh_destroy(&mesh);
     }
     ovoid_molecule_destroy(&molecule);
@@ -591,19 +603,20 @@ static void exact_vertices_stay_on_their_edges(void **state) {
 
 /* ---- lattices ----------------------------------------------------------------------------- */
 
-/* phi is c at many lattice points: a cube of atoms at lattice points. */
+/* phi is c at many lattice points: a cube of atoms at lattice points, or an edge of it. */
 static void values_equal_to_the_isovalue_are_inside(void **state) {
     double xyzr[4 * 8];
-    for (size_t i = 0; i < 8; ++i) {
+    const size_t atoms = test_size(8, 2);
+    for (size_t i = 0; i < atoms; ++i) {
         for (size_t k = 0; k < 3; ++k)
             xyzr[4 * i + k] = i >> k & 1 ? 8.0 : 0.0;
         xyzr[4 * i + 3] = 2.0;
     }
     for (int rule = 0; rule < 2; ++rule) {
         const ovoid_mesh_options options = options_of(1.0, 1.0, (ovoid_vertex_rule)rule);
-        ovoid_mesh *mesh = mesh_atoms(*state, xyzr, 8, 0.5, &options);
-        assert_int_equal(expect_closed(mesh), 16);
-        assert_int_equal(ovoid_mesh_components(mesh), 8);
+        ovoid_mesh *mesh = mesh_atoms(*state, xyzr, atoms, 0.5, &options);
+        assert_int_equal(expect_closed(mesh), 2 * atoms);
+        assert_int_equal(ovoid_mesh_components(mesh), atoms);
         double low = INFINITY, high = -INFINITY;
         for (size_t k = 0; k < 3 * ovoid_mesh_vertices(mesh); ++k) {
             low = fmin(low, ovoid_mesh_xyz(mesh)[k]);
@@ -620,13 +633,14 @@ static void far_from_the_origin(void **state) {
     test_random random = {13};
     const double far[3] = {40000.0, -90000.0, 262144.0};
     double here[4 * 10], there[4 * 10];
-    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
-    for (size_t k = 0; k < 40; ++k) {
+    const size_t atoms = test_size(10, 4);
+    const ovoid_mesh_options options = options_of(1.0, coarse(0.5), OVOID_VERTEX_EXACT);
+    for (size_t k = 0; k < 4 * atoms; ++k) {
         here[k] = k % 4 == 3 ? 1.5 : round(random_uniform(&random, -40.0, 40.0)) / 8.0;
         there[k] = k % 4 == 3 ? here[k] : here[k] + far[k % 4];
     }
-    ovoid_mesh *a = mesh_atoms(*state, here, 10, 0.5, &options),
-               *b = mesh_atoms(*state, there, 10, 0.5, &options);
+    ovoid_mesh *a = mesh_atoms(*state, here, atoms, 0.5, &options),
+               *b = mesh_atoms(*state, there, atoms, 0.5, &options);
     assert_int_equal(ovoid_mesh_vertices(a), ovoid_mesh_vertices(b));
     assert_int_equal(ovoid_mesh_triangles(a), ovoid_mesh_triangles(b));
     for (size_t k = 0; k < 3 * ovoid_mesh_vertices(a); ++k)
@@ -637,19 +651,66 @@ static void far_from_the_origin(void **state) {
 
 /* A box of 1e17 lattice points; what is evaluated follows the two atoms. */
 static void memory_follows_the_surface(void **state) {
-    static const uint64_t small[3] = {16, 16, 16};
+    static const uint64_t limits[][3] = {{4, 4, 4}, OV_MARCH_PIECE};
     const double xyzr[8] = {0.0, 0.0, 0.0, 1.5, 2e5, -3e5, 4e5, 1.5};
     const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
     ov_quadric *const quadrics = quadrics_of(xyzr, 2, 0.5);
     ov_body bodies[2];
-    ovoid_mesh *mesh = NULL;
     for (size_t i = 0; i < 2; ++i)
         ov_body_of_atom(xyzr + 4 * i, 0.5, &bodies[i]);
-    test_check(*state, ov_march(*state, bodies, 2, &options, test_small() ? small : whole, &mesh));
-    assert_int_equal(expect_surface(mesh, quadrics, 2, &options), 4);
-    assert_int_equal(ovoid_mesh_components(mesh), 2);
-    ovoid_mesh_destroy(&mesh);
+    for (size_t k = 0; k < test_size(2, 1); ++k) {
+        ovoid_mesh *mesh = NULL;
+        test_check(*state, ov_march(*state, bodies, 2, &options, limits[k], &mesh));
+        assert_int_equal(expect_surface(mesh, quadrics, 2, &options), 4);
+        assert_int_equal(ovoid_mesh_components(mesh), 2);
+        ovoid_mesh_destroy(&mesh);
+    }
     free(quadrics);
+}
+
+/* With one atom no piece is there that need not be. Its surface ends now in the first points of a
+ * piece, now in the last, and a neighbour has only the other end of the edges. */
+static void pieces_reach_as_far_as_the_surface(void **state) {
+    enum { BOX = 13 };
+    static const uint64_t limit[3] = {4, 2, 2};
+    const double spacing = 0.5;
+    const int64_t low[3] = {-6, -6, -6};
+    const size_t box[3] = {BOX, BOX, BOX};
+    const ovoid_mesh_options options = options_of(1.0, spacing, OVOID_VERTEX_LINEAR);
+    test_random random = {15};
+    for (size_t k = 0; k < test_size(40, 2); ++k) {
+        double xyzr[4];
+        for (int axis = 0; axis < 3; ++axis)
+            xyzr[axis] = random_uniform(&random, -0.8, 0.8);
+        xyzr[3] = random_uniform(&random, 0.7, 1.8);
+        ov_body body;
+        reference_mesh wanted;
+        ovoid_mesh *mesh = NULL;
+        ov_body_of_atom(xyzr, 0.5, &body);
+        reference_march(&body.quadric, 1, 1.0, spacing, low, box, &wanted);
+        test_check(*state, ov_march(*state, &body, 1, &options, limit, &mesh));
+        assert_int_equal(expect_closed(mesh), 2);
+        expect_same(mesh, &wanted, 1e-5);
+        ovoid_mesh_destroy(&mesh);
+        reference_mesh_destroy(&wanted);
+    }
+}
+
+/* Atoms at lattice points whose surfaces end at lattice points: the first or last of a piece, too,
+ * and rounding decides on which side they lie. */
+static void tips_at_the_ends_of_pieces(void **state) {
+    static const uint64_t limits[][3] = {{4, 2, 2}, {4, 4, 6}, {8, 6, 4}};
+    const double decays[] = {0.5, 0.3, 0.77};
+    for (size_t k = 0; k < test_size(27, 1); ++k) {
+        const double xyzr[4] = {1.5, -2.0, 0.5, 1.0 + 0.5 * (double)(k % 3)};
+        const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+        ov_body body;
+        ovoid_mesh *mesh = NULL;
+        ov_body_of_atom(xyzr, decays[k / 3 % 3], &body);
+        test_check(*state, ov_march(*state, &body, 1, &options, limits[k / 9], &mesh));
+        assert_int_equal(expect_closed(mesh), 2);
+        ovoid_mesh_destroy(&mesh);
+    }
 }
 
 static void two_runs_are_the_same(void **state) {
@@ -786,6 +847,8 @@ int main(void) {
         cmocka_unit_test(values_equal_to_the_isovalue_are_inside),
         cmocka_unit_test(far_from_the_origin),
         cmocka_unit_test(memory_follows_the_surface),
+        cmocka_unit_test(pieces_reach_as_far_as_the_surface),
+        cmocka_unit_test(tips_at_the_ends_of_pieces),
         cmocka_unit_test(two_runs_are_the_same),
         cmocka_unit_test(a_protein_is_closed),
         cmocka_unit_test(refusals),

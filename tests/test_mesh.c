@@ -41,6 +41,21 @@ static void test_tetrahedron(void **state) {
     ovoid_mesh_destroy(NULL);
 }
 
+/* One triangle is one component, whichever of its corners another shares. */
+static void test_one_triangle(void **state) {
+    static const double xyz[15] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1};
+    static const uint32_t corners[6] = {0, 1, 2, 3, 4, 2};
+    for (size_t triangles = 1; triangles <= 2; ++triangles) {
+        ovoid_mesh *mesh = NULL;
+        test_check(*state, ovoid_mesh_create(*state, xyz, NULL, 1 + 2 * triangles, corners,
+                                             triangles, &mesh));
+        assert_int_equal(ovoid_mesh_components(mesh), 1);
+        assert_int_equal(ovoid_mesh_component(mesh, 0)->euler, 1);
+        assert_false(ovoid_mesh_component(mesh, 0)->closed);
+        ovoid_mesh_destroy(&mesh);
+    }
+}
+
 /* Edges that are missing, double or turned are seen. */
 static void test_defects(void **state) {
     shape s = {0};
@@ -206,8 +221,8 @@ static void test_needles(void **state) {
         const uint32_t *const c = s.corners + 3 * t;
         double x[3], length = 0.0;
         for (size_t k = 0; k < 3; ++k) {
-            x[k] = 0.498 * s.xyz[3 * c[0] + k] + 0.498 * s.xyz[3 * c[1] + k] +
-                   0.004 * s.xyz[3 * c[2] + k];
+            x[k] = 0.49995 * s.xyz[3 * c[0] + k] + 0.49995 * s.xyz[3 * c[1] + k] +
+                   0.0001 * s.xyz[3 * c[2] + k];
             length += x[k] * x[k];
         }
         for (size_t k = 0; k < 3; ++k) {
@@ -258,13 +273,10 @@ static void test_refusals(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tetrahedron),
-        cmocka_unit_test(test_defects),
-        cmocka_unit_test(test_components),
-        cmocka_unit_test(test_orders),
-        cmocka_unit_test(test_flat_surface_stays_flat),
-        cmocka_unit_test(test_needles),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_tetrahedron), cmocka_unit_test(test_one_triangle),
+        cmocka_unit_test(test_defects),     cmocka_unit_test(test_components),
+        cmocka_unit_test(test_orders),      cmocka_unit_test(test_flat_surface_stays_flat),
+        cmocka_unit_test(test_needles),     cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, make_context, test_close);
 }

@@ -78,7 +78,7 @@ static ov_quadric atom(double x, double y, double z, double radius, double decay
 static void sphere_has_its_shape(void **state) {
     const double r = 1.6, d = 0.7, c = 0.8, radius = sqrt(r * r - log(c) / d);
     const double centre[3] = {0.3, -0.2, 5.0};
-    const uint32_t side = (uint32_t)test_size(200, 24);
+    const uint32_t side = (uint32_t)test_size(200, 12);
     const ov_quadric one = atom(centre[0], centre[1], centre[2], r, d);
     view v = trace(*state, &one, 1, c, square_of_rays(side, side, 5.0));
     double worst = 0.0, worst_normal = 0.0;
@@ -129,7 +129,7 @@ static void see_model(test_random *random, model_kind kind, double half, ov_quad
  * where rays only just touch. */
 static void rays_are_the_references(void **state) {
     static const model_kind kinds[] = {MODEL_RANDOM, MODEL_SPHERE, MODEL_GIMBAL, MODEL_PANCAKE};
-    const uint32_t side = (uint32_t)test_size(30, 6);
+    const uint32_t side = (uint32_t)test_size(30, 4);
     const size_t terms = 12;
     const double c = 1.0, depth = 60.0;
     for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; ++k) {
@@ -205,7 +205,7 @@ static void deep_scenes_work(void **state) {
 }
 
 static void ellipsoids_are_seen_singly(void **state) {
-    const uint32_t side = (uint32_t)test_size(60, 12);
+    const uint32_t side = (uint32_t)test_size(60, 8);
     const size_t terms = 25;
     const double c = 1.2;
     ov_quadric quadrics[25];
@@ -248,7 +248,7 @@ static void ellipsoids_are_seen_singly(void **state) {
 }
 
 static void comparison_is_the_formula(void **state) {
-    const uint32_t side = (uint32_t)test_size(60, 12);
+    const uint32_t side = (uint32_t)test_size(60, 8);
     const size_t terms = 10;
     const double c = 1.0;
     ov_quadric own[10], other[10];
@@ -480,7 +480,7 @@ static const double lone_atom[4] = {30.0, -20.0, 10.0, 2.0};
 /* Radius and place of the silhouette, colour of the middle, and nothing around. */
 static void sphere_looks_like_one(void **state) {
     ovoid_molecule *molecule = make_molecule(*state, lone_atom, 1);
-    const uint32_t side = (uint32_t)test_size(121, 21), middle = side / 2;
+    const uint32_t side = (uint32_t)test_size(121, 15), middle = side / 2;
     ovoid_picture_options options = small_picture(side, side);
     options.across = 6.0;
     options.background = 0x204060ff;
@@ -499,7 +499,7 @@ static void sphere_looks_like_one(void **state) {
     const ov_colour own = ov_colour_linear(options.original), haze = ov_colour_linear(0x204060ffu);
     const double extent = sqrt(4.0 + log(1.0 / 0.4) / 0.5); /* what the distance fades over */
     for (uint32_t step = 0; step < 10; ++step) {
-        const uint32_t x = middle - step * middle / 20, y = middle + step * middle / 30;
+        const uint32_t x = middle - step * middle / 18, y = middle + step * middle / 22;
         const double u = pixel * ((double)x - middle), v = pixel * ((double)middle - y);
         const double z = sqrt(4.0 - u * u - v * v), normal[3] = {u / 2.0, v / 2.0, z / 2.0};
         const double colour[3] = {own.rgba[0], own.rgba[1], own.rgba[2]};
@@ -539,7 +539,8 @@ static void edges_are_smooth(void **state) {
 static void neighbours_shade_each_other(void **state) {
     const double two[8] = {-2.0, 0.0, 0.0, 2.0, 2.0, 0.0, 0.0, 2.0};
     ovoid_molecule *pair = make_molecule(*state, two, 2), *alone = make_molecule(*state, two, 1);
-    ovoid_picture_options options = small_picture(41, 21);
+    const uint32_t height = (uint32_t)test_size(21, 9), row = height / 2;
+    ovoid_picture_options options = small_picture(41, height);
     options.across = 10.0;
     options.direction[2] = 1.0;
     memset(options.centre, 0, sizeof options.centre);
@@ -547,8 +548,8 @@ static void neighbours_shade_each_other(void **state) {
     ovoid_image *open = render(*state, alone, NULL, &options);
     const uint32_t toward = 16, away = 6;
     for (int k = 0; k < 3; ++k) {
-        assert_true(pixel_of(shaded, toward, 10)[k] + 1 < pixel_of(open, toward, 10)[k]);
-        expect_near(pixel_of(shaded, away, 10)[k], pixel_of(open, away, 10)[k], 1.0,
+        assert_true(pixel_of(shaded, toward, row)[k] + 1 < pixel_of(open, toward, row)[k]);
+        expect_near(pixel_of(shaded, away, row)[k], pixel_of(open, away, row)[k], 1.0,
                     "a pixel that looks away");
     }
     ovoid_image_destroy(&shaded);
@@ -599,14 +600,15 @@ static void tiny_pictures(void **state) {
 /* A model that is larger is red, one that is smaller blue, and the range is the distance's. */
 static void difference_has_its_sign(void **state) {
     const double one[4] = {0.0, 0.0, 0.0, 2.0};
+    const uint32_t width = (uint32_t)test_size(16, 8), height = (uint32_t)test_size(12, 6);
     ovoid_molecule *molecule = make_molecule(*state, one, 1);
     for (int sign = -1; sign <= 1; sign += 2) {
         /* (phi~ - phi) / |grad phi| = (f - 1) / 2 at r = 2 with d = 0.5 */
         ovoid_model *model = make_sphere_model(*state, 0.0, (1.0 + 0.3 * sign) * exp(2.0), 0.5);
-        ovoid_picture_options options = small_picture(16, 12);
+        ovoid_picture_options options = small_picture(width, height);
         options.view = OVOID_VIEW_DIFFERENCE;
         ovoid_image *image = render(*state, molecule, model, &options);
-        const uint8_t *const middle = pixel_of(image, 8, 6);
+        const uint8_t *const middle = pixel_of(image, width / 2, height / 2);
         assert_true(sign > 0 ? middle[0] > middle[2] + 40 : middle[2] > middle[0] + 40);
         expect_near(ovoid_image_range(image), 0.2, 1e-9, "the range: 0.15, rounded up");
         ovoid_image_destroy(&image);
@@ -624,15 +626,16 @@ static void overlay_shows_both(void **state) {
     const double one[4] = {0.0, 0.0, 0.0, 2.0};
     ovoid_molecule *molecule = make_molecule(*state, one, 1);
     ovoid_model *model = make_sphere_model(*state, 1.0, exp(2.0), 0.5);
-    ovoid_picture_options options = small_picture(80, 4);
+    const uint32_t height = (uint32_t)test_size(4, 2), row = height / 2;
+    ovoid_picture_options options = small_picture(80, height);
     options.view = OVOID_VIEW_OVERLAY;
     options.across = 8.0;
     options.direction[2] = 1.0;
     options.original = 0x0000ffff;
     options.model = 0xff0000ff;
     ovoid_image *image = render(*state, molecule, model, &options);
-    const uint8_t *const film = pixel_of(image, 42, 2), *const bare = pixel_of(image, 60, 2);
-    const uint8_t *const glass = pixel_of(image, 23, 2); /* and nothing below */
+    const uint8_t *const film = pixel_of(image, 42, row), *const bare = pixel_of(image, 60, row);
+    const uint8_t *const glass = pixel_of(image, 23, row); /* and nothing below */
     assert_true(film[2] > film[0] + 60);
     assert_true(bare[0] > bare[2] + 60);
     assert_true(glass[2] > glass[0] + 15 && glass[0] > film[0]);
@@ -643,15 +646,16 @@ static void overlay_shows_both(void **state) {
 
 static void centres_are_marked(void **state) {
     ovoid_model *model = make_sphere_model(*state, 4.0, exp(2.0), 0.5);
-    ovoid_picture_options options = small_picture(20, 20);
+    const uint32_t side = (uint32_t)test_size(20, 12), middle = side / 2, off = side / 3;
+    ovoid_picture_options options = small_picture(side, side);
     options.view = OVOID_VIEW_MODEL;
     options.points = 0x0000ffff;
     ovoid_image *marked = render(*state, NULL, model, &options);
     options.centres = false;
     ovoid_image *bare = render(*state, NULL, model, &options);
-    assert_true(pixel_of(marked, 10, 10)[2] > pixel_of(marked, 10, 10)[0] + 80);
-    assert_true(pixel_of(bare, 10, 10)[0] > pixel_of(bare, 10, 10)[2]);
-    assert_memory_equal(pixel_of(marked, 6, 6), pixel_of(bare, 6, 6), 4);
+    assert_true(pixel_of(marked, middle, middle)[2] > pixel_of(marked, middle, middle)[0] + 80);
+    assert_true(pixel_of(bare, middle, middle)[0] > pixel_of(bare, middle, middle)[2]);
+    assert_memory_equal(pixel_of(marked, off, off), pixel_of(bare, off, off), 4);
     ovoid_image_destroy(&marked);
     ovoid_image_destroy(&bare);
     ovoid_model_destroy(&model);
@@ -682,15 +686,16 @@ static void panel_is_three_pictures(void **state) {
 
 static void pictures_repeat_exactly(void **state) {
     double xyzr[4 * 30];
+    const size_t atoms = test_size(30, 8);
     test_random random = {13};
-    for (size_t i = 0; i < 30; ++i) {
+    for (size_t i = 0; i < atoms; ++i) {
         for (size_t k = 0; k < 3; ++k)
             xyzr[4 * i + k] = random_uniform(&random, -5.0, 5.0);
         xyzr[4 * i + 3] = random_uniform(&random, 1.0, 2.0);
     }
-    ovoid_molecule *molecule = make_molecule(*state, xyzr, 30);
+    ovoid_molecule *molecule = make_molecule(*state, xyzr, atoms);
     ovoid_model *model = make_sphere_model(*state, 0.4, exp(3.0), 0.2);
-    const uint32_t width = (uint32_t)test_size(120, 12), height = (uint32_t)test_size(90, 8);
+    const uint32_t width = (uint32_t)test_size(120, 6), height = (uint32_t)test_size(90, 4);
     for (int view_of = OVOID_VIEW_ORIGINAL; view_of <= OVOID_VIEW_ELLIPSOIDS; ++view_of) {
         ovoid_picture_options options = small_picture(width, height);
         options.view = (ovoid_view)view_of;

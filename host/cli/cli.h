@@ -39,9 +39,21 @@ cli_warning(const char *format, ...);
 /* An ovoid_warning_fn; user is a bool: quiet. */
 void cli_on_warning(const char *text, void *quiet);
 
+/* Makes a context whose warnings are printed unless *quiet. False: *code is the exit code, all
+ * said. */
+bool cli_context(bool *quiet, ovoid_context **context, int *code);
+
 /* Reports the context's error, unless a signal is behind it, and returns the exit code for
  * `status`; `io` is the one for OVOID_ERROR_IO: CLI_INPUT or CLI_OUTPUT. */
 int cli_failure(const ovoid_context *context, ovoid_status status, int io);
+
+/* The options that all who compute have. */
+#define CLI_HELP_RUNNING                                                                           \
+    "  --device SELECTOR   number, type (cpu, gpu) or part of the name of a device that\n"         \
+    "                      'ovoid devices' lists (default: OVOID_DEVICE, else the first GPU,\n"    \
+    "                      else the first device)\n"                                               \
+    "  -q, --quiet         print errors only\n"                                                    \
+    "  -h, --help          show this help\n"
 
 /* The exit codes and environment variables, as the helps show them. */
 void cli_print_exit_codes(FILE *stream);
@@ -75,6 +87,10 @@ bool cli_number_parse(const cli_number *number, const char *text, void *structur
 void cli_number_help(const cli_number *number, const void *structure, FILE *stream);
 
 double cli_number_value(const cli_number *number, const void *structure);
+
+/* Long options for numbers, of the values first, first + 1 and so on, and behind them the end of
+ * the table: count + 1 entries. */
+void cli_number_options(const cli_number *numbers, size_t count, int first, struct option *options);
 
 /* Explains what getopt_long() did not like about the option it has just met ('?' or ':', with an
  * option string that begins with ':' and values above 255 for long options) and returns CLI_USAGE.

@@ -171,12 +171,10 @@ static bool parse_option(int option, export_job *job) {
 
 /* Fills in the job from the command line. False: the program ends with *code, all said. */
 static bool parse(int argc, char **argv, export_job *job, int *code) {
-    struct option all[NAMED_COUNT + NUMBER_COUNT + 1] = {{0}};
+    struct option all[NAMED_COUNT + NUMBER_COUNT + 1];
     int option;
     memcpy(all, named, sizeof named);
-    for (int i = 0; i < NUMBER_COUNT; i++)
-        all[NAMED_COUNT + i] =
-            (struct option){numbers[i].name, required_argument, NULL, NUMBERS + i};
+    cli_number_options(numbers, NUMBER_COUNT, NUMBERS, all + NAMED_COUNT);
     job->numbers.decay = OVOID_DEFAULT_DECAY;
     ovoid_export_options_init(&job->numbers.options);
     opterr = 0;
@@ -255,13 +253,8 @@ int cli_export(int argc, char **argv) {
     export_job job = {0};
     int code;
     if (parse(argc, argv, &job, &code)) {
-        if (ovoid_context_create(&job.context) == OVOID_OK) {
-            ovoid_context_on_warning(job.context, cli_on_warning, &job.quiet);
+        if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);
-        } else {
-            cli_error("out of memory");
-            code = CLI_COMPUTE;
-        }
     }
     source_destroy(&job.source);
     ovoid_context_destroy(&job.context);

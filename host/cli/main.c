@@ -53,6 +53,16 @@ void cli_on_warning(const char *text, void *quiet) {
         cli_warning("%s", text);
 }
 
+bool cli_context(bool *quiet, ovoid_context **context, int *code) {
+    if (ovoid_context_create(context) != OVOID_OK) {
+        cli_error("out of memory");
+        *code = CLI_COMPUTE;
+        return false;
+    }
+    ovoid_context_on_warning(*context, cli_on_warning, quiet);
+    return true;
+}
+
 int cli_failure(const ovoid_context *context, ovoid_status status, int io) {
     int number = cli_interrupted();
     if (number) {

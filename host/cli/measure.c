@@ -43,33 +43,26 @@ static const cli_number isovalue_number = {
 void cli_measure_help(FILE *stream) {
     ovoid_measure_options defaults;
     ovoid_measure_options_init(&defaults);
-    fputs(
-        "Usage: ovoid measure MOLECULE MODEL [OPTION]...\n"
-        "\n"
-        "Compares the surface of a molecule (PQR or XYZR, also compressed with gzip) with that\n"
-        "of a model that 'ovoid fit' made of it: areas, volumes, distances in both directions\n"
-        "from the points of one surface to the triangles of the other, and connected pieces.\n"
-        "The outer surface is what is left without the walls of cavities.\n"
-        "\n"
-        "Files:\n"
-        "  --report FILE       write the measures as JSON, - for standard output\n"
-        "  --format NAME       of the molecule: pqr or xyzr (default: by its extension, else by\n"
-        "                      its contents)\n"
-        "\n"
-        "One of the inputs can be - for standard input. Files appear whole at the end or not\n"
-        "at all; those that exist are replaced.\n"
-        "\n"
-        "Running:\n"
-        "  --device SELECTOR   number, type (cpu, gpu) or part of the name of a device that\n"
-        "                      'ovoid devices' lists (default: OVOID_DEVICE, else the first GPU,\n"
-        "                      else the first device)\n"
-        "  -q, --quiet         print errors only\n"
-        "  -h, --help          show this help\n"
-        "\n"
-        "The surfaces:\n"
-        "  --isovalue X[,X]... measure where the fields have these values (default: the\n"
-        "                      model's)\n",
-        stream);
+    fputs("Usage: ovoid measure MOLECULE MODEL [OPTION]...\n"
+          "\n"
+          "Compares the surface of a molecule (PQR or XYZR, also compressed with gzip) with that\n"
+          "of a model that 'ovoid fit' made of it: areas, volumes, distances in both directions\n"
+          "from the points of one surface to the triangles of the other, and connected pieces.\n"
+          "The outer surface is what is left without the walls of cavities.\n"
+          "\n"
+          "Files:\n"
+          "  --report FILE       write the measures as JSON, - for standard output\n"
+          "  --format NAME       of the molecule: pqr or xyzr (default: by its extension, else by\n"
+          "                      its contents)\n"
+          "\n"
+          "One of the inputs can be - for standard input. Files appear whole at the end or not\n"
+          "at all; those that exist are replaced.\n"
+          "\n"
+          "Running:\n" CLI_HELP_RUNNING "\n"
+          "The surfaces:\n"
+          "  --isovalue X[,X]... measure where the fields have these values (default: the\n"
+          "                      model's)\n",
+          stream);
     cli_number_help(&spacing_number, &defaults, stream);
     fprintf(
         stream,
@@ -359,13 +352,8 @@ int cli_measure(int argc, char **argv) {
     if (parse(argc, argv, &job, &code)) {
         bool taken = job.report && strcmp(job.report, "-") == 0;
         job.summary = job.quiet ? NULL : taken ? stderr : stdout;
-        if (ovoid_context_create(&job.context) == OVOID_OK) {
-            ovoid_context_on_warning(job.context, cli_on_warning, &job.quiet);
+        if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);
-        } else {
-            cli_error("out of memory");
-            code = CLI_COMPUTE;
-        }
     }
     for (size_t i = 0; job.rows && i < job.row_count; i++)
         free(job.rows[i].error);

@@ -1,5 +1,5 @@
 /*
- * What a fit, `ovoid measure` and `ovoid mesh` share: inputs, options about surfaces, and measures
+ * What the subcommands about surfaces share: inputs, options about surfaces, and measures
  * as text and as JSON.
  */
 #ifndef CLI_MEASURES_H

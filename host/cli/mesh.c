@@ -39,32 +39,25 @@ static void set_defaults(mesh_job *job) {
 void cli_mesh_help(FILE *stream) {
     mesh_job defaults = {0};
     set_defaults(&defaults);
-    fputs(
-        "Usage: ovoid mesh INPUT [OPTION]...\n"
-        "\n"
-        "Writes the surface of a molecule or of a model as a closed triangle mesh, made by\n"
-        "marching cubes, with normals from the field's gradient. INPUT is a molecule (PQR or\n"
-        "XYZR, also compressed with gzip), a model that 'ovoid fit' wrote, or - for standard\n"
-        "input.\n"
-        "\n"
-        "Files:\n"
-        "  -o, --output FILE   where the mesh goes; its name ends in .ply (binary), .obj, .stl\n"
-        "                      (binary), .off or .glb (binary glTF) (default: the name of the\n"
-        "                      input with the extension .ply, in the current folder)\n"
-        "  --format NAME       of the input: pqr, xyzr or ovoid (default: by its extension,\n"
-        "                      else by its contents; standard input is a model)\n"
-        "\n"
-        "The file appears whole at the end or not at all; one that exists is replaced.\n"
-        "\n"
-        "Running:\n"
-        "  --device SELECTOR   number, type (cpu, gpu) or part of the name of a device that\n"
-        "                      'ovoid devices' lists (default: OVOID_DEVICE, else the first GPU,\n"
-        "                      else the first device)\n"
-        "  -q, --quiet         print errors only\n"
-        "  -h, --help          show this help\n"
-        "\n"
-        "The surface:\n",
-        stream);
+    fputs("Usage: ovoid mesh INPUT [OPTION]...\n"
+          "\n"
+          "Writes the surface of a molecule or of a model as a closed triangle mesh, made by\n"
+          "marching cubes, with normals from the field's gradient. INPUT is a molecule (PQR or\n"
+          "XYZR, also compressed with gzip), a model that 'ovoid fit' wrote, or - for standard\n"
+          "input.\n"
+          "\n"
+          "Files:\n"
+          "  -o, --output FILE   where the mesh goes; its name ends in .ply (binary), .obj, .stl\n"
+          "                      (binary), .off or .glb (binary glTF) (default: the name of the\n"
+          "                      input with the extension .ply, in the current folder)\n"
+          "  --format NAME       of the input: pqr, xyzr or ovoid (default: by its extension,\n"
+          "                      else by its contents; standard input is a model)\n"
+          "\n"
+          "The file appears whole at the end or not at all; one that exists is replaced.\n"
+          "\n"
+          "Running:\n" CLI_HELP_RUNNING "\n"
+          "The surface:\n",
+          stream);
     for (size_t i = 0; i < NUMBER_COUNT; i++)
         cli_number_help(&numbers[i], &defaults, stream);
     fprintf(stream,
@@ -257,13 +250,8 @@ int cli_mesh(int argc, char **argv) {
     int code;
     if (parse(argc, argv, &job, &code)) {
         job.summary = job.quiet ? NULL : stdout;
-        if (ovoid_context_create(&job.context) == OVOID_OK) {
-            ovoid_context_on_warning(job.context, cli_on_warning, &job.quiet);
+        if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);
-        } else {
-            cli_error("out of memory");
-            code = CLI_COMPUTE;
-        }
     }
     ovoid_mesh_destroy(&job.mesh);
     source_destroy(&job.source);

@@ -100,6 +100,13 @@ void cli_number_help(const cli_number *number, const void *structure, FILE *stre
     print_wrapped(text, stream);
 }
 
+void cli_number_options(const cli_number *numbers, size_t count, int first,
+                        struct option *options) {
+    for (size_t i = 0; i < count; i++)
+        options[i] = (struct option){numbers[i].name, required_argument, NULL, first + (int)i};
+    options[count] = (struct option){NULL, 0, NULL, 0};
+}
+
 int cli_bad_option(const char *command, int result, char **argv, const struct option *options) {
     enum { MOST = 64 };
     const char *given = argv[optind - 1];

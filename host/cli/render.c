@@ -1,6 +1,4 @@
-#include "cli.h"
-
-#include "ovoid/surface.h"
+#include "measures.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -139,13 +137,7 @@ void cli_render_help(FILE *stream) {
         "\n"
         "Running:\n"
         "  --format NAME       of the molecule: pqr or xyzr (default: by its extension, else by\n"
-        "                      its contents)\n"
-        "  --device SELECTOR   number, type (cpu, gpu) or part of the name of a device that\n"
-        "                      'ovoid devices' lists (default: OVOID_DEVICE, else the first GPU,\n"
-        "                      else the first device)\n"
-        "  -q, --quiet         print errors only\n"
-        "  -h, --help          show this help\n"
-        "\n"
+        "                      its contents)\n" CLI_HELP_RUNNING "\n"
         "Examples:\n"
         "  ovoid render molecule.pqr -o molecule.png\n"
         "  ovoid render molecule.pqr model.ovoid --view difference -o difference.png\n"
@@ -257,24 +249,7 @@ static bool parse_colours(const char *text, ovoid_picture_options *options) {
                         &options->model);
 }
 
-static bool parse_format(const char *text, ovoid_molecule_format *format) {
-    if (strcmp(text, "pqr") == 0) {
-        *format = OVOID_MOLECULE_PQR;
-    } else if (strcmp(text, "xyzr") == 0) {
-        *format = OVOID_MOLECULE_XYZR;
-    } else {
-        cli_error("--format takes pqr or xyzr, not '%s'", text);
-        return false;
-    }
-    return true;
-}
-
 /* ---- the command line ----------------------------------------------------------------------- */
-
-static bool is_model_name(const char *path) {
-    const size_t length = strlen(path);
-    return length > 6 && strcmp(path + length - 6, ".ovoid") == 0;
-}
 
 static bool check_files(const render_job *job) {
     const char *const inputs[] = {job->molecule_path, job->model_path};
@@ -304,7 +279,7 @@ static bool take_inputs(int argc, char **argv, render_job *job) {
         return false;
     }
     const bool alone = optind + 1 == argc;
-    if (alone && is_model_name(argv[optind]))
+    if (alone && strcmp(argv[optind], "-") != 0 && cli_is_model(argv[optind]))
         job->model_path = argv[optind];
     else
         job->molecule_path = argv[optind];
@@ -391,7 +366,7 @@ static bool take_option(int option, render_job *job) {
         options->colour_bar = false;
         return true;
     case FORMAT:
-        return parse_format(optarg, &job->format);
+        return source_parse_molecule(optarg, &job->format);
     case DEVICE:
         job->device = optarg;
         return true;
@@ -412,10 +387,7 @@ static bool parse(int argc, char **argv, render_job *job, int *code) {
     struct option all[NAMED_COUNT + NUMBER_COUNT + 1];
     int option;
     memcpy(all, named, sizeof named);
-    for (int i = 0; i < NUMBER_COUNT; i++)
-        all[NAMED_COUNT + i] =
-            (struct option){numbers[i].name, required_argument, NULL, NUMBERS + i};
-    all[NAMED_COUNT + NUMBER_COUNT] = (struct option){NULL, 0, NULL, 0};
+    cli_number_options(numbers, NUMBER_COUNT, NUMBERS, all + NAMED_COUNT);
     opterr = 0;
     *code = CLI_USAGE;
     while ((option = getopt_long(argc, argv, ":o:qh", all, NULL)) != -1) {
@@ -453,10 +425,10 @@ static void print_summary(const render_job *job) {
     FILE *const stream = strcmp(job->output, "-") == 0 ? stderr : stdout;
     const ovoid_device_info *const device = ovoid_context_device(job->context);
     if (job->molecule)
-        fprintf(stream, "molecule  %s: %zu atoms\n", job->molecule_path,
+        fprintf(stream, "molecule  %s: %zu atoms\n", source_name(job->molecule_path),
                 ovoid_molecule_atoms(job->molecule));
     if (job->model)
-        fprintf(stream, "model     %s: %zu ellipsoids\n", job->model_path,
+        fprintf(stream, "model     %s: %zu ellipsoids\n", source_name(job->model_path),
                 ovoid_model_size(job->model));
     fprintf(stream, "device    %s\n", device->name);
     if (ovoid_image_range(job->image) > 0.0)
@@ -503,13 +475,8 @@ int cli_render(int argc, char **argv) {
     int code;
     ovoid_picture_options_init(&job.options);
     if (parse(argc, argv, &job, &code)) {
-        if (ovoid_context_create(&job.context) == OVOID_OK) {
-            ovoid_context_on_warning(job.context, cli_on_warning, &job.quiet);
+        if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);
-        } else {
-            cli_error("out of memory");
-            code = CLI_COMPUTE;
-        }
     }
     ovoid_image_destroy(&job.image);
     ovoid_model_destroy(&job.model);

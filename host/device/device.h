@@ -62,6 +62,10 @@ ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const
                               ov_kernel *kernel);
 void ov_kernel_destroy(ov_kernel *kernel);
 
+/* `wanted` work-items in a group, or as many as the kernel can have: for kernels whose work-items
+ * share nothing. */
+size_t ov_kernel_group(const ov_kernel *kernel, size_t wanted);
+
 /* One kernel argument: a value of `size` bytes. OV_ARG takes an lvalue (a cl_mem, a scalar). */
 typedef struct ov_arg {
     size_t size;

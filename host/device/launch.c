@@ -4,6 +4,10 @@
 
 /* ---- launches ----------------------------------------------------------------------------- */
 
+size_t ov_kernel_group(const ov_kernel *kernel, size_t wanted) {
+    return wanted < kernel->max_group ? wanted : kernel->max_group;
+}
+
 static ovoid_status check_launch(ovoid_context *context, const ov_kernel *kernel, size_t global,
                                  size_t local, size_t arg_count) {
     if (arg_count != kernel->arg_count)

@@ -389,8 +389,8 @@ static void bent_at(const bent_triangle *t, const double *l, double *x, double *
 }
 
 /* Dunavant's rule of degree 4, which the volume's integrand has. The area's is the vector area
- * along the interpolated normal: unlike its length it stays true where a needle of a triangle,
- * whose plane may be anything, folds over. */
+ * along the interpolated normal: signed, so that what bending folds over in a needle of a triangle
+ * counts for nothing. */
 static void integrate_bent(const bent_triangle *t, ov_content *content) {
     static const double near_edge[2] = {0.445948490915965, 0.091576213509771};
     static const double weight[2] = {0.223381589678011, 0.109951743655322};

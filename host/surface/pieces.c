@@ -96,12 +96,15 @@ static ovoid_status plan(ovoid_context *context, const planner *p, const uint64_
     return total < 9e18 ? OVOID_OK : fail_large(context, pieces->spacing);
 }
 
+/* What rounding may add to a reach, in lattice steps. */
+#define MARGIN 0.5
+
 /* Pieces along an axis that an interval reaches, one lattice step about them included. */
 static void piece_range(const ov_pieces *pieces, int axis, double centre, double half,
                         uint64_t *first, uint64_t *end) {
     const double size = (double)pieces->size[axis], origin = (double)pieces->origin[axis];
-    const double from = (centre - half) / pieces->spacing - origin,
-                 to = (centre + half) / pieces->spacing - origin;
+    const double from = (centre - half) / pieces->spacing - origin - MARGIN,
+                 to = (centre + half) / pieces->spacing - origin + MARGIN;
     const double low = fmax(ceil(from / size) - 1.0, 0.0),
                  high = fmin(floor((to + 1.0) / size) + 1.0, (double)pieces->count[axis]);
     *first = (uint64_t)low;

@@ -191,10 +191,10 @@ void ov_tracer_destroy(ov_tracer *tracer) {
 typedef struct ray_arguments {
     cl_uint packs, blocks, tile, tiles, slabs;
     cl_float left, top, spacing, front, step;
-    size_t global, group;
+    size_t global, group; /* work-items, each a vector of rays */
 } ray_arguments;
 
-/* Packs in a work-group of a CPU, and work-items in one of a GPU: nothing is shared. */
+/* Work-items in a work-group of a CPU and of a GPU: nothing is shared. */
 #define CPU_GROUP 4
 #define GPU_GROUP 64
 
@@ -210,7 +210,6 @@ static ovoid_status prepare(ovoid_context *context, ov_kernel *kernel, const cha
     OV_TRY(ov_buffer_reserve(context, &hits->depth, bytes, "depths of rays"));
     OV_TRY(ov_buffer_reserve(context, &hits->normal, bytes, "normals of rays"));
     OV_TRY(ov_buffer_reserve(context, &hits->extra, bytes, "values of rays"));
-    const size_t lanes = device->shape.lanes;
     *arguments = (ray_arguments){
         .packs = (cl_uint)packs,
         .blocks = (cl_uint)ov_rays_blocks(rays),
@@ -222,8 +221,8 @@ static ovoid_status prepare(ovoid_context *context, ov_kernel *kernel, const cha
         .spacing = (cl_float)rays->spacing,
         .front = (cl_float)boxes->front,
         .step = (cl_float)boxes->step,
-        .global = packs * lanes,
-        .group = lanes == 1 ? CPU_GROUP : GPU_GROUP,
+        .global = packs * (OV_PACK / device->shape.vector),
+        .group = ov_kernel_group(kernel, device->shape.lanes == 1 ? CPU_GROUP : GPU_GROUP),
     };
 cleanup:
     return status;

@@ -145,7 +145,8 @@ OVOID_API ovoid_status ovoid_molecule_read(ovoid_context *context, const char *p
                                            ovoid_molecule_format format, ovoid_molecule **molecule);
 
 /* Makes a molecule of `atoms` atoms from xyzr[4 * i + {0, 1, 2, 3}] = x, y, z, radius (angstrom).
- * Values must be finite and radii not negative; the array is copied. */
+ * Values must be finite, coordinates within 1e6 angstrom of the origin along each axis, radii 0 to
+ * 100 angstrom, and there must be an atom; the same holds for files. The array is copied. */
 OVOID_API ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr,
                                              size_t atoms, ovoid_molecule **molecule);
 

@@ -102,9 +102,9 @@ typedef struct ovoid_distances {
     double rms;
 } ovoid_distances;
 
-/* On the device, through a hash of the triangles in cells. outer_only leaves out components that
+/* On the device, through a tree of boxes over the triangles. outer_only leaves out components that
  * are not outer, of both meshes. from_a, when not NULL, receives the distance of each vertex of a
- * (0 for those left out). */
+ * (0 for those left out). OVOID_ERROR_EMPTY when a mesh has no triangle that counts. */
 OVOID_API ovoid_status ovoid_mesh_distances(ovoid_context *context, const ovoid_mesh *a,
                                             const ovoid_mesh *b, bool outer_only,
                                             ovoid_distances *distances, float *from_a);

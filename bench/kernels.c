@@ -18,9 +18,13 @@
 #include <string.h>
 
 /* Floating-point operations per pair, a fused multiply-add counting as two: for field 3
- * differences, 14 for the exponent, 15 for 2^t, 1 for the sum; moments adds 18 for the ten sums. */
+ * differences, 14 for the exponent, 15 for 2^t, 1 for the sum; field_polynomial adds 19 for the
+ * polynomial and its product, moments 18 for the ten sums. gram has 32 for e, 2 for w e^2, and 22,
+ * 30 and 45 for its three groups of sums, differences included. */
 #define FIELD_FLOPS 33.0
+#define POLYNOMIAL_FLOPS 52.0
 #define MOMENTS_FLOPS 51.0
+#define GRAM_FLOPS 131.0
 
 #define CUTOFF 1e-5
 #define REPEATS 7
@@ -227,7 +231,7 @@ static void make_molecule_lists(bench *b, const char *path, const char *model, s
         fail(b);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const size_t atoms = ovoid_molecule_atoms(molecule);
-    const ov_band band = {b->isovalue - 1.0, b->isovalue + 1.0};
+    const ov_band band = {.low = b->isovalue - 1.0, .high = b->isovalue + 1.0};
     size_t count;
     ov_quadric *const quadrics = quadrics_of(b, xyzr, atoms, model, &count);
     if (ov_lattice_create(b->context, xyzr, atoms, b->spacing, b->padding, &lattice) ||
@@ -254,11 +258,11 @@ static void destroy_setting(setting *s) {
 
 /* ---- operations --------------------------------------------------------------------------- */
 
-typedef enum operation { FIELD, MOMENTS, LISTS, OPERATIONS } operation;
+typedef enum operation { FIELD, POLYNOMIAL, MOMENTS, GRAM, LISTS } operation;
 
 typedef struct work {
     ov_operations operations;
-    ov_buffer value, moments;
+    ov_buffer value, moments, polynomial, product, gram;
 } work;
 
 static ovoid_status enqueue(bench *b, operation what, setting *s, work *w) {
@@ -268,9 +272,28 @@ static ovoid_status enqueue(bench *b, operation what, setting *s, work *w) {
     case MOMENTS:
         return ov_moments(b->context, &w->operations, &s->points, &s->terms, &s->lists, &w->value,
                           &w->moments);
+    case POLYNOMIAL:
+        return ov_field_polynomial(b->context, &w->operations, &s->points, &s->terms, &s->lists,
+                                   &w->polynomial, &w->value, &w->product);
+    case GRAM:
+        return ov_gram(b->context, &w->operations, &s->points, &s->terms, &s->lists, &w->value,
+                       &w->gram);
     default:
         return ov_lists_build(b->context, &s->lists, &s->points, &s->terms, 0.0);
     }
+}
+
+/* Coefficients that keep all of the arithmetic. */
+static void make_polynomial(bench *b, const setting *s, work *w) {
+    const size_t size = s->terms.count * OV_MONOMIALS, bytes = size * sizeof(float);
+    float *const coefficients = need(malloc(bytes));
+    uint64_t state = 2;
+    for (size_t j = 0; j < size; ++j)
+        coefficients[j] = (float)uniform(&state);
+    if (ov_buffer_reserve(b->context, &w->polynomial, bytes, "polynomials") ||
+        ov_buffer_write(b->context, &w->polynomial, 0, coefficients, bytes))
+        fail(b);
+    free(coefficients);
 }
 
 static double repeat(bench *b, operation what, setting *s, work *w, unsigned times) {
@@ -302,7 +325,7 @@ static void row(bench *b, const setting *s, const char *pass, double seconds, do
         snprintf(useful, sizeof useful, "%.2f", s->useful);
     if (flops > 0.0)
         snprintf(fraction, sizeof fraction, "%.2f", rate * flops / b->peak);
-    printf("%-24.24s %8zu %9zu  %-8s %11.1f %12.2f %9s %7s\n", s->name, s->terms.count,
+    printf("%-24.24s %8zu %9zu  %-10s %11.1f %12.2f %9s %7s\n", s->name, s->terms.count,
            s->points.count, pass, 1e6 * seconds, 1e-9 * rate, fraction, useful);
     if (b->csv)
         fprintf(b->csv, "%s,%zu,%zu,%s,%.0f,%.3f,%.3f,%s,%s\n", s->name, s->terms.count,
@@ -315,8 +338,14 @@ static void run_setting(bench *b, setting *s) {
         const char *name;
         double flops;
     } rows[] = {
-        {FIELD, "field", FIELD_FLOPS}, {MOMENTS, "moments", MOMENTS_FLOPS}, {LISTS, "lists", 0}};
+        {FIELD, "field", FIELD_FLOPS},
+        {POLYNOMIAL, "polynomial", POLYNOMIAL_FLOPS},
+        {MOMENTS, "moments", MOMENTS_FLOPS},
+        {GRAM, "gram", GRAM_FLOPS},
+        {LISTS, "lists", 0},
+    };
     work w = {0};
+    make_polynomial(b, s, &w);
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; ++k) {
         if (rows[k].what == LISTS && s->useful < 0.0)
             continue;
@@ -325,6 +354,9 @@ static void run_setting(bench *b, setting *s) {
     ov_operations_destroy(&w.operations);
     ov_buffer_destroy(&w.value);
     ov_buffer_destroy(&w.moments);
+    ov_buffer_destroy(&w.polynomial);
+    ov_buffer_destroy(&w.product);
+    ov_buffer_destroy(&w.gram);
     destroy_setting(s);
 }
 
@@ -336,7 +368,7 @@ static bool is_model(const char *path) {
 int main(int argc, char **argv) {
     ovoid_fit_options defaults;
     ovoid_fit_options_init(&defaults);
-    bench b = {.spacing = defaults.spacing,
+    bench b = {.spacing = OVOID_DEFAULT_SPACING_L1,
                .padding = defaults.padding,
                .decay = defaults.decay,
                .isovalue = defaults.isovalue};
@@ -370,7 +402,7 @@ int main(int argc, char **argv) {
     const ovoid_device_info *const info = ovoid_context_device(b.context);
     printf("device   %s (%s, driver %s)\n", info->name, info->platform, info->driver);
     printf("peak     %.1f GFLOP/s float32, measured\n\n", 1e-9 * b.peak);
-    printf("%-24s %8s %9s  %-8s %11s %12s %9s %7s\n", "lists", "terms", "points", "pass",
+    printf("%-24s %8s %9s  %-10s %11s %12s %9s %7s\n", "lists", "terms", "points", "pass",
            "microsec", "Gpairs/s", "of peak", "useful");
     if (b.csv)
         fprintf(b.csv,

@@ -22,16 +22,18 @@ cat <<END
 
 Programs that need a molecule's surface often take the Gaussian surface: each atom is a round
 Gaussian, and the surface is where their sum is 1. Ovoid looks for far fewer Gaussians, stretched
-and rotated to ellipsoids, whose sum has nearly the same surface. It starts with one per atom and
-then, step by step, pulls useless ones towards zero, deletes them and lets the others make up for
-it. This may take a minute.
+and rotated to ellipsoids, whose sum has nearly the same surface. It merges the atoms' Gaussians to a
+few and moves, stretches and splits those until the two surfaces are nowhere further apart than half
+an angstrom.
 
 The file is $molecule. The command is
 
   ovoid fit $name.pqr -o $name.ovoid --report $name.json --trace $name.csv
 
 END
-"$ovoid" fit "$molecule" -o "$model" --report "$report" --trace "$trace"
+code=0
+"$ovoid" fit "$molecule" -o "$model" --report "$report" --trace "$trace" || code=$?
+[ "$code" -eq 0 ] || [ "$code" -eq 7 ] || exit "$code" # 7: a model, but not as close as asked for
 
 # Value of a number in the report, at its outer level.
 number() {
@@ -39,12 +41,11 @@ number() {
 }
 atoms=$(number atoms)
 ellipsoids=$(number ellipsoids)
-awk -v atoms="$atoms" -v ellipsoids="$ellipsoids" -v rms="$(number rms_error)" \
-    -v largest="$(number max_error)" 'BEGIN {
-    printf "\n%d atoms became %d ellipsoids: %.1f atoms for each. At the points near the surface,\n",
+awk -v atoms="$atoms" -v ellipsoids="$ellipsoids" -v largest="$(number deviation)" \
+    -v mean="$(number mean_distance_outer)" 'BEGIN {
+    printf "\n%d atoms became %d ellipsoids: %.1f atoms for each. Their surface is nowhere further\n",
            atoms, ellipsoids, atoms / ellipsoids
-    printf "where the sum of the atoms is between 0 and 2, the sum of the ellipsoids differs from it\n"
-    printf "by %.2g in the mean (root mean square) and by %.2g at most.\n", rms, largest
+    printf "than %.2f Å from that of the atoms, and %.2f Å in the mean.\n", largest, mean
 }'
 cat <<END
 
@@ -52,7 +53,7 @@ The files are in $folder:
   $name.ovoid  the model, one ellipsoid per line: amplitude, decay rates along its three axes,
               centre, rotation angles
   $name.json   the numbers above and more, for programs
-  $name.csv    the course of the fit, one line per iteration
+  $name.csv    the course of the fit, one line per step
 
 The first lines of the model:
 

@@ -170,10 +170,14 @@ __kernel void distances(const uint count, const uint each, __global const float 
         z = xyz[3 * k + 2];
         /* The triangle found before is at most this far; the factor stands for rounding. */
         const float reach = (sqrt(bound) + sqrt(fma(dx, dx, fma(dy, dy, dz * dz)))) * 1.00001f;
-        const float limit = fma(reach, reach, FLT_MIN);
-        bound = ov_nearest(x, y, z, limit, levels, first_group, boxes, triangles);
-        if (bound >= limit && limit < INFINITY)
-            bound = ov_nearest(x, y, z, INFINITY, levels, first_group, boxes, triangles);
+        float limit = fma(reach, reach, FLT_MIN);
+        /* A loop around one call: compilers that inline it do so once. */
+        for (;;) {
+            bound = ov_nearest(x, y, z, limit, levels, first_group, boxes, triangles);
+            if (bound < limit || limit == INFINITY)
+                break;
+            limit = INFINITY;
+        }
         squared[k] = bound;
     }
 }

@@ -47,14 +47,14 @@ __kernel void field(const uint packs, __global const float *restrict points,
         OV_STORE(sum[v], v * OV_LANES + lane, value + (size_t)pack * OV_PACK);
 }
 
-/* value[k] = sum_i e_i(y_k) p_i(y_k - mu_i); polynomial: OV_MONOMIALS coefficients per term, in the
- * order of shared.h. With p_i the derivatives along a direction v of the parameters this is J v. */
-__kernel void field_polynomial(const uint packs, __global const float *restrict points,
-                               __global const uint *restrict start,
-                               __global const uint *restrict item,
-                               __global const ov_term *restrict terms,
-                               __global const float *restrict polynomial,
-                               __global float *restrict value) {
+/* value[k] = weight[k] sum_i e_i(y_k) p_i(y_k - mu_i); weight: OV_PACK per pack, or null for 1;
+ * polynomial: OV_MONOMIALS coefficients per term, in the order of shared.h. With p_i the
+ * derivatives along a direction v of the parameters this is J v, and W J v with weights. */
+__kernel void
+field_polynomial(const uint packs, __global const float *restrict points,
+                 __global const uint *restrict start, __global const uint *restrict item,
+                 __global const ov_term *restrict terms, __global const float *restrict polynomial,
+                 __global const float *restrict weight, __global float *restrict value) {
     const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
     if (pack >= packs)
         return;
@@ -83,8 +83,12 @@ __kernel void field_polynomial(const uint packs, __global const float *restrict 
         }
     }
 #pragma unroll
-    for (uint v = 0; v < OV_VECTORS; ++v)
-        OV_STORE(sum[v], v * OV_LANES + lane, value + (size_t)pack * OV_PACK);
+    for (uint v = 0; v < OV_VECTORS; ++v) {
+        const uint at = v * OV_LANES + lane;
+        if (weight)
+            sum[v] *= OV_LOAD(at, weight + (size_t)pack * OV_PACK);
+        OV_STORE(sum[v], at, value + (size_t)pack * OV_PACK);
+    }
 }
 
 /* value[k] = sum_i e_i(y_k), and its gradient in angstrom^-1: OV_PACK x, y, z components per pack,

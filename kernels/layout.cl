@@ -26,7 +26,7 @@ kernel void layout(global uint *out) {
     out[n++] = OFFSET(term, yz);
     out[n++] = OFFSET(term, zz);
     out[n++] = OFFSET(term, reach);
-    out[n++] = OFFSET(term, padding);
+    out[n++] = OFFSET(term, skin);
     out[n++] = sizeof(ov_tree);
     out[n++] = OFFSET(tree, levels);
     out[n++] = OFFSET(tree, boxes);

@@ -57,11 +57,15 @@ static inline void ov_test_group(const ov_term t, __global const float *group, f
     }
 }
 
-/* The packs of every term in ascending order. With item NULL-like (fill == 0) only count[i] is
- * written; otherwise the packs of term i go to item[start[i]] and on. */
+/* What packs_of_terms() writes. */
+#define OV_COUNT 0      /* count[i] alone */
+#define OV_FILL 1       /* the packs of term i, to item[start[i]] and on */
+#define OV_FILL_COUNT 2 /* both, of the packs as many as fit before start[i + 1] */
+
+/* The packs of every term in ascending order. */
 __kernel void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
                              const ov_tree tree, __global const float *restrict boxes,
-                             const float skin, const uint fill, __global uint *restrict count,
+                             const float skin, const uint mode, __global uint *restrict count,
                              __global const uint *restrict start, __global uint *restrict item) {
     /* A copy, made where all work-items still run together: Mesa's compiler does not look up kernel
      * arguments by an index that differs between them. */
@@ -74,7 +78,8 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
         return;
     const ov_term t = terms[index];
     uint found = 0;
-    uint at = fill ? start[index] : 0;
+    uint at = mode == OV_COUNT ? 0 : start[index];
+    const uint end = mode == OV_COUNT ? 0 : mode == OV_FILL ? UINT_MAX : start[index + 1];
     if (t.reach >= 0.0f && levels > 0) {
         /* Depth first: pending[l] has a bit for each box of the current group of level l that is
          * still to be visited. */
@@ -87,18 +92,15 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
         while (level < levels) {
             if (fresh) {
                 const size_t g = first_group[level] + group[level];
-                ov_test_group(t, boxes + g * (6 * OV_GROUP), skin, hit);
+                ov_test_group(t, boxes + g * (6 * OV_GROUP), skin + t.skin, hit);
                 uint bits = 0;
                 for (uint j = 0; j < OV_GROUP; ++j)
                     bits |= hit[j] ? 1u << j : 0u;
                 if (level == 0) {
-                    if (fill) {
-                        for (uint j = 0; j < OV_GROUP; ++j)
-                            if (bits >> j & 1u)
-                                item[at++] = group[0] * OV_GROUP + j;
-                    } else {
-                        found += popcount(bits);
-                    }
+                    found += popcount(bits);
+                    for (uint j = 0; j < OV_GROUP && at < end; ++j)
+                        if (bits >> j & 1u)
+                            item[at++] = group[0] * OV_GROUP + j;
                     bits = 0;
                 }
                 pending[level] = bits;
@@ -115,8 +117,23 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
             fresh = true;
         }
     }
-    if (!fill)
+    if (mode != OV_FILL)
         count[index] = found;
+}
+
+/* Closes the gaps that OV_FILL_COUNT leaves: the packs of term i from room[room_start[i]] and on to
+ * item[start[i]] and on. */
+__kernel void close_gaps(const uint terms_count, __global const uint *restrict room_start,
+                         __global const uint *restrict room, __global const uint *restrict start,
+                         __global uint *restrict item) {
+    const uint index = get_global_id(0);
+    if (index >= terms_count)
+        return;
+    __global const uint *const from = room + room_start[index];
+    __global uint *const to = item + start[index];
+    const uint count = start[index + 1] - start[index];
+    for (uint k = 0; k < count; ++k)
+        to[k] = from[k];
 }
 
 /* count[p] += 1 for every term of pack p; count starts at zero. */

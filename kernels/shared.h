@@ -28,6 +28,13 @@ typedef float ov_f32;
 #define OV_LEVELS 7
 /* Monomials of degree up to 2 in z = y - centre: 1, x, y, z, xx, xy, xz, yy, yz, zz. */
 #define OV_MONOMIALS 10
+/* Monomials of degree up to 4, of which the products of two of those above are made: 1; x, y, z;
+ * xx, xy, xz, yy, yz, zz; xxx, xxy, xxz, xyy, xyz, xzz, yyy, yyz, yzz, zzz; xxxx, xxxy, xxxz, xxyy,
+ * xxyz, xxzz, xyyy, xyyz, xyzz, xzzz, yyyy, yyyz, yyzz, yzzz, zzzz. */
+#define OV_GRAM 35
+
+/* Ellipsoids in a work-group of the solver (kernels/solve.cl). */
+#define OV_SOLVE_GROUP 32
 
 /* Triangles in a leaf of the tree over a mesh, and floats of each (kernels/distance.cl). */
 #define OV_LEAF 16
@@ -40,7 +47,7 @@ typedef struct ov_term {
     ov_f32 x, y, z;                /* centre */
     ov_f32 xx, xy, xz, yy, yz, zz; /* A, off-diagonals doubled: q = xx x^2 + xy x y + ... */
     ov_f32 reach;                  /* largest q within the cut-off; negative: reaches nothing */
-    ov_f32 padding;
+    ov_f32 skin;                   /* angstrom by which lists let it move, beyond their own skin */
 } ov_term;
 
 /* A tree of boxes over consecutive leaves: level 0 holds the leaves, each level above one box per

@@ -414,7 +414,7 @@ static void test_layout(void **state) {
         offsetof(ov_term, yz),
         offsetof(ov_term, zz),
         offsetof(ov_term, reach),
-        offsetof(ov_term, padding),
+        offsetof(ov_term, skin),
         sizeof(ov_tree),
         offsetof(ov_tree, levels),
         offsetof(ov_tree, boxes),

@@ -25,7 +25,8 @@ static void expect_distances(ovoid_context *context, const double *xyz, size_t v
     ov_facets facets = {0};
     float *const squared = test_alloc(count, sizeof *squared);
     test_check(context, ovoid_mesh_create(context, xyz, NULL, vertices, corners, triangles, &mesh));
-    test_check(context, ov_facets_create(context, mesh, false, origin, &facets));
+    test_check(context, ov_facets_create(context, mesh, false,
+                                         OV_FACETS_TRIANGLES | OV_FACETS_POINTS, origin, &facets));
     test_check(context, ov_facets_distances(context, &facets, points, count, squared));
     double worst = 0.0;
     for (size_t k = 0; k < count; ++k) {
@@ -64,7 +65,8 @@ static void test_one_triangle(void **state) {
     for (size_t k = 0; k < CASES; ++k)
         memcpy(points + 3 * k, cases[k].point, sizeof cases[k].point);
     test_check(context, ovoid_mesh_create(context, xyz, NULL, 3, corners, 1, &mesh));
-    test_check(context, ov_facets_create(context, mesh, false, origin, &facets));
+    test_check(context, ov_facets_create(context, mesh, false,
+                                         OV_FACETS_TRIANGLES | OV_FACETS_POINTS, origin, &facets));
     assert_int_equal(facets.points, 4);
     test_check(context, ov_facets_distances(context, &facets, points, CASES, squared));
     for (size_t k = 0; k < CASES; ++k) {

@@ -70,7 +70,7 @@ static void polynomial_equals_twin(void **state) {
             coefficients[j] = (float)random_uniform(&random, -1.0, 1.0);
         write_floats(*state, &polynomial, coefficients, size);
         test_check(*state, ov_field_polynomial(*state, &b.operations, &b.points, &b.terms, &b.lists,
-                                               &polynomial, &value));
+                                               &polynomial, NULL, &value));
         float *const got = read_floats(*state, &value, b.count);
         for (size_t k = 0; k < b.count; ++k)
             expect_close(
@@ -98,7 +98,7 @@ static void polynomial_takes_each_monomial(void **state) {
             coefficients[i * OV_MONOMIALS + m] = 1.0f + (float)i;
         write_floats(*state, &polynomial, coefficients, 3 * OV_MONOMIALS);
         test_check(*state, ov_field_polynomial(*state, &b.operations, &b.points, &b.terms, &b.lists,
-                                               &polynomial, &value));
+                                               &polynomial, NULL, &value));
         float *const got = read_floats(*state, &value, b.count);
         for (size_t k = 0; k < b.count; ++k)
             expect_close(got[k],
@@ -108,6 +108,52 @@ static void polynomial_takes_each_monomial(void **state) {
     }
     ov_buffer_destroy(&value);
     ov_buffer_destroy(&polynomial);
+    bench_destroy(&b);
+}
+
+/* The sum is multiplied once, at the end: to the last bit what the host makes of it. A weight of 0
+ * leaves nothing, at the fill neither. */
+static void polynomial_is_weighted(void **state) {
+    bench b;
+    double worst = 0.0;
+    test_random random = {8};
+    ov_buffer plain = {0}, weighted = {0}, polynomial = {0}, weights = {0};
+    random_bench(&b, *state, MODEL_RANDOM, 350);
+    const size_t size = b.terms_count * OV_MONOMIALS, all = b.points.packs * OV_PACK;
+    float *const coefficients = test_alloc(size, sizeof *coefficients);
+    float *const weight = test_alloc(all, sizeof *weight);
+    for (size_t j = 0; j < size; ++j)
+        coefficients[j] = (float)random_uniform(&random, -1.0, 1.0);
+    for (size_t k = 0; k < b.count; ++k)
+        weight[k] = k % 7 ? (float)random_uniform(&random, -2.0, 2.0) : 0.0f;
+    write_floats(*state, &polynomial, coefficients, size);
+    write_floats(*state, &weights, weight, all);
+    test_check(*state, ov_field_polynomial(*state, &b.operations, &b.points, &b.terms, &b.lists,
+                                           &polynomial, &weights, &weighted));
+    test_check(*state, ov_field_polynomial(*state, &b.operations, &b.points, &b.terms, &b.lists,
+                                           &polynomial, NULL, &plain));
+    float *const got = read_floats(*state, &weighted, all), *const sum =
+                                                                read_floats(*state, &plain, all);
+    for (size_t k = 0; k < all; ++k) {
+        const float product = weight[k] * sum[k];
+        assert_true(got[k] == product);
+    }
+    for (size_t k = 0; k < b.count; ++k) {
+        reference_sum wanted =
+            reference_field_polynomial(b.quadrics, coefficients, b.terms_count, b.xyz + 3 * k);
+        wanted.value *= weight[k];
+        wanted.scale *= fabs((double)weight[k]);
+        expect_close(got[k], wanted, TOLERANCE, &worst, "weighted value", k);
+    }
+    print_message("field_polynomial with weights: %.2f of %g\n", worst, TOLERANCE);
+    free(got);
+    free(sum);
+    free(coefficients);
+    free(weight);
+    ov_buffer_destroy(&plain);
+    ov_buffer_destroy(&weighted);
+    ov_buffer_destroy(&polynomial);
+    ov_buffer_destroy(&weights);
     bench_destroy(&b);
 }
 
@@ -429,6 +475,7 @@ int main(void) {
         cmocka_unit_test(field_is_accurate_to_two_millionths),
         cmocka_unit_test(polynomial_equals_twin),
         cmocka_unit_test(polynomial_takes_each_monomial),
+        cmocka_unit_test(polynomial_is_weighted),
         cmocka_unit_test(gradient_equals_twin),
         cmocka_unit_test(cut_off_loses_less_than_it_says),
         cmocka_unit_test(exponential_is_accurate_over_its_range),

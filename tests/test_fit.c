@@ -2,24 +2,13 @@
 #include "support.h"
 
 static ovoid_fit_options short_options(void) {
-    const ovoid_fit_options options = {
-        .method = OVOID_METHOD_L1,
-        .decay = 0.5,
-        .isovalue = 1.0,
-        .spacing = test_size(80, 180) / 100.0,
-        .padding = 2.0,
-        .l1 = {.iterations = (uint32_t)test_size(60, 4),
-               .sparse_iterations = (uint32_t)test_size(40, 3),
-               .epsilon = 0.05,
-               .max_error = 0.5,
-               .prune_below = 1e-3,
-               .prune_every = 20,
-               .first_step = OVOID_FIRST_STEP_SECANT,
-               .armijo = 1e-4,
-               .shrink = 0.5,
-               .grow = 2.0,
-               .max_backtracks = 30},
-    };
+    ovoid_fit_options options;
+    ovoid_fit_options_init(&options);
+    options.method = OVOID_METHOD_L1;
+    options.spacing = test_size(80, 180) / 100.0;
+    options.padding = 2.0;
+    options.l1.iterations = (uint32_t)test_size(60, 4);
+    options.l1.sparse_iterations = (uint32_t)test_size(40, 3);
     return options;
 }
 
@@ -52,12 +41,15 @@ static void expect_result(ovoid_context *context, const ovoid_molecule *molecule
                           const ovoid_fit_result *result) {
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const size_t atoms = ovoid_molecule_atoms(molecule);
-    const ov_band band = {options->isovalue - 1.0, options->isovalue + 1.0};
+    const ov_band band = {.low = options->isovalue - 1.0, .high = options->isovalue + 1.0};
     const ov_sampling sampling = {0};
     ov_lattice lattice;
     ov_samples samples = {0};
-    test_check(context, ov_lattice_create(context, xyzr, atoms, options->spacing, options->padding,
+    test_check(context, ov_lattice_create(context, xyzr, atoms, result->spacing, options->padding,
                                           &lattice));
+    assert_true(result->spacing ==
+                (options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1));
+    assert_true(result->reached && isnan(result->distance));
     test_check(context,
                ov_sample(context, xyzr, atoms, options->decay, &lattice, band, sampling, &samples));
     const size_t count = samples.points.count;
@@ -268,7 +260,6 @@ static void bad_options_are_named(void **state) {
     REFUSE(decay, INFINITY, "decay");
     REFUSE(isovalue, 0.0, "isovalue");
     REFUSE(isovalue, INFINITY, "isovalue");
-    REFUSE(spacing, 0.0, "spacing");
     REFUSE(spacing, INFINITY, "spacing");
     REFUSE(padding, INFINITY, "padding");
     REFUSE(l1.epsilon, 0.0, "epsilon");
@@ -300,12 +291,15 @@ static void defaults_are_accepted(void **state) {
     ovoid_fit_options_init(NULL);
     assert_true(options.decay == OVOID_DEFAULT_DECAY);
     assert_true(options.isovalue == OVOID_DEFAULT_ISOVALUE);
+    assert_int_equal(options.method, OVOID_METHOD_ADAPTIVE);
+    assert_true(options.spacing == 0.0); /* the method's own */
     assert_null(options.progress);
     /* the constants that the paper gives */
     assert_int_equal(options.l1.iterations, 8000);
     assert_int_equal(options.l1.sparse_iterations, 6000);
     assert_true(options.l1.max_error == 0.5 && options.l1.prune_below == 1e-3);
     assert_int_equal(options.l1.prune_every, 20);
+    options.method = OVOID_METHOD_L1;
     options.l1.iterations = options.l1.sparse_iterations = 3;
     fit_one(*state, molecule, &options);
     ovoid_molecule_destroy(&molecule);

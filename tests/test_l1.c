@@ -96,7 +96,7 @@ static double *parameters_of(const ovoid_model *model) {
 /* The constrained points and phi there, in double. */
 static size_t points_of(ovoid_context *context, const double *xyzr, size_t atoms,
                         const ovoid_fit_options *options, double **xyz, double **target) {
-    const ov_band band = {options->isovalue - 1.0, options->isovalue + 1.0};
+    const ov_band band = {.low = options->isovalue - 1.0, .high = options->isovalue + 1.0};
     const ov_sampling sampling = {0};
     ov_lattice lattice;
     ov_samples samples = {0};

@@ -196,7 +196,7 @@ static void moments_and_polynomial_are_adjoint(void **state) {
     ov_buffer polynomial = {0}, value = {0};
     write_floats(*state, &polynomial, v, size);
     test_check(*state, ov_field_polynomial(*state, &b.operations, &b.points, &b.terms, &b.lists,
-                                           &polynomial, &value));
+                                           &polynomial, NULL, &value));
     float *const jv = read_floats(*state, &value, b.count);
     double *const jtu = moments_of(&b, u);
     double left = 0.0, right = 0.0, scale = 0.0;

@@ -54,6 +54,25 @@ static void position(const ov_lattice *lattice, size_t index, double y[3]) {
     }
 }
 
+/* Whether all three indices of a lattice point, counted from 0, are multiples of step; 0: never. */
+static bool is_multiple(const ov_lattice *lattice, size_t index, uint32_t step) {
+    bool multiple = step > 0;
+    for (size_t axis = 0; axis < 3 && multiple; ++axis) {
+        multiple = index % (size_t)lattice->size[axis] % step == 0;
+        index /= (size_t)lattice->size[axis];
+    }
+    return multiple;
+}
+
+/* The points of the band, and the guards on either side of it. */
+static bool belongs(const ov_band *band, const ov_lattice *lattice, size_t index, double phi) {
+    if (phi >= band->low && phi <= band->high)
+        return true;
+    if (phi > band->high)
+        return is_multiple(lattice, index, band->inside_every);
+    return phi >= band->outside_low && is_multiple(lattice, index, band->outside_every);
+}
+
 /* x_i = a + i (b - a) / N_x with N_x = ceil((b - a) / spacing), at least 1. */
 static void expect_lattice(const job *j, const ov_lattice *lattice) {
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -106,13 +125,14 @@ static size_t expect_samples(ovoid_context *context, const job *j) {
         double y[3];
         position(&lattice, index, y);
         phi = reference_phi(j->xyzr, j->atoms, j->decay, y);
-        const bool inside = phi >= j->band.low && phi <= j->band.high;
-        wanted += inside;
-        if (inside == kept[index])
+        const bool is_wanted = belongs(&j->band, &lattice, index, phi);
+        wanted += is_wanted;
+        if (is_wanted == kept[index])
             continue;
         /* only where rounding decides */
         const double tolerance = tolerance_at(j, &lattice, y, &phi, gradient);
-        assert_true(fmin(fabs(phi - j->band.low), fabs(phi - j->band.high)) <= tolerance);
+        assert_true(is_wanted != belongs(&j->band, &lattice, index, phi - tolerance) ||
+                    is_wanted != belongs(&j->band, &lattice, index, phi + tolerance));
     }
     const size_t count = points->count;
     print_message("%zu of %zu lattice points kept, %zu wanted\n", count, all, wanted);
@@ -144,7 +164,10 @@ static void small_molecule(void **state) {
              .decay = 0.5,
              .spacing = test_size(70, 110) / 100.0,
              .padding = 2.0};
-    const ov_band bands[] = {{0.0, 2.0}, {0.02, 2.0}, {0.5, 2.5}, {-0.5, 1.5}};
+    const ov_band bands[] = {{.low = 0.0, .high = 2.0},
+                             {.low = 0.02, .high = 2.0},
+                             {.low = 0.5, .high = 2.5},
+                             {.low = -0.5, .high = 1.5}};
     size_t count[4];
     for (size_t n = 0; n < 4; ++n) {
         j.band = bands[n];
@@ -161,14 +184,18 @@ static void small_molecule(void **state) {
 static void exterior_points_are_kept(void **state) {
     const double xyzr[4] = {0.3, 0.2, -0.1, 1.5};
     const double far = test_size(12, 9);
-    const job j = {
-        .xyzr = xyzr, .atoms = 1, .decay = 0.5, .spacing = 1.0, .padding = far, .band = {0.0, 2.0}};
+    const job j = {.xyzr = xyzr,
+                   .atoms = 1,
+                   .decay = 0.5,
+                   .spacing = 1.0,
+                   .padding = far,
+                   .band = {.low = 0.0, .high = 2.0}};
     const job shell = {.xyzr = xyzr,
                        .atoms = 1,
                        .decay = 0.5,
                        .spacing = 1.0,
                        .padding = far,
-                       .band = {1e-6, 2.0}};
+                       .band = {.low = 1e-6, .high = 2.0}};
     const size_t all = expect_samples(*state, &j), near = expect_samples(*state, &shell);
     assert_true(all > 2 * near);
 }
@@ -189,7 +216,7 @@ static void lattice_of_several_pieces(void **state) {
              .decay = 0.5,
              .spacing = 0.5,
              .padding = 1.0,
-             .band = {0.02, 2.0}};
+             .band = {.low = 0.02, .high = 2.0}};
     ov_lattice lattice;
     test_check(*state, ov_lattice_create(*state, xyzr, ATOMS, j.spacing, j.padding, &lattice));
     assert_true(lattice.size[0] > 128 && lattice.size[2] > 64);
@@ -203,11 +230,84 @@ static void lattice_of_several_pieces(void **state) {
 /* Pieces that no atom reaches lie outside, and belong to a band that begins at 0. */
 static void pieces_without_atoms(void **state) {
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
-    job j = {
-        .xyzr = xyzr, .atoms = 2, .decay = 0.5, .spacing = 0.6, .padding = 1.0, .band = {0.0, 2.0}};
+    job j = {.xyzr = xyzr,
+             .atoms = 2,
+             .decay = 0.5,
+             .spacing = 0.6,
+             .padding = 1.0,
+             .band = {.low = 0.0, .high = 2.0}};
     const size_t all = expect_samples(*state, &j);
     j.band.low = 0.02;
     assert_true(expect_samples(*state, &j) < all / 10);
+}
+
+/* Guards are every n-th point of the lattice, on the side where they are asked for. */
+static void guards_on_a_coarser_lattice(void **state) {
+    double xyzr[4 * ATOMS];
+    test_random random = {3};
+    random_atoms(&random, xyzr, ATOMS, (const double[3]){3.0, 2.0, 2.5});
+    job j = {.xyzr = xyzr,
+             .atoms = ATOMS,
+             .decay = 0.5,
+             .spacing = test_size(50, 130) / 100.0,
+             .padding = 3.0,
+             .band = {.low = 0.02, .high = 2.0, .outside_low = 1e-4}};
+    const size_t bare = expect_samples(*state, &j);
+    size_t inside[4] = {bare}, outside[4] = {bare};
+    for (uint32_t every = 1; every <= 3; ++every) {
+        j.band.inside_every = every;
+        j.band.outside_every = 0;
+        inside[every] = expect_samples(*state, &j);
+        j.band.inside_every = 0;
+        j.band.outside_every = every;
+        outside[every] = expect_samples(*state, &j);
+    }
+    assert_true(inside[1] > inside[2] && inside[2] > inside[3] && inside[3] > bare);
+    assert_true(outside[1] > outside[2] && outside[2] > outside[3] && outside[3] > bare);
+    j.band.inside_every = 2;
+    j.band.outside_every = 3;
+    assert_int_equal(expect_samples(*state, &j), inside[2] + outside[3] - bare);
+    j.band.outside_low = 0.5; /* above the band's low end: nothing is left for guards */
+    assert_int_equal(expect_samples(*state, &j), inside[2]);
+}
+
+/* Several pieces, their sizes no multiples of the guards' step; and guards of the outside that
+ * reach down to 0, where pieces without atoms hold nothing else. */
+static void guards_in_pieces(void **state) {
+    const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
+    job j = {.xyzr = xyzr,
+             .atoms = 2,
+             .decay = 0.5,
+             .spacing = test_size(6, 11) / 10.0,
+             .padding = 1.0,
+             .band = {.low = 0.02, .high = 2.0, .inside_every = 3, .outside_every = 7}};
+    const size_t all = expect_samples(*state, &j);
+    j.band.outside_low = 1e-5;
+    assert_true(expect_samples(*state, &j) < all);
+}
+
+/* Counts the questions in *user; says stop to the third. */
+static bool stop_at_third(uint64_t points, void *user) {
+    uint64_t *const asked = user;
+    (void)points;
+    return ++*asked < 3;
+}
+
+/* Guards that reach down to 0 everywhere are counted for what they are, not as whole pieces: the
+ * lattice has 5e11 points, and the guards among them are a dozen. */
+static void few_guards_need_little_room(void **state) {
+    const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 5000.0, 300.0, 300.0, 1.7};
+    const ov_band band = {.low = 0.02, .high = 2.0, .outside_every = 4000};
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    uint64_t asked = 0;
+    const ov_sampling sampling = {stop_at_third, &asked};
+    if (test_small())
+        skip();
+    test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.1, 3.0, &lattice));
+    test_refused(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, band, sampling, &samples),
+                 OVOID_ERROR_CANCELLED, "");
+    assert_int_equal(asked, 3);
 }
 
 static void odd_molecules(void **state) {
@@ -218,11 +318,15 @@ static void odd_molecules(void **state) {
     const double straight[] = {0.0, 7.0, 5.0, 1.5, 2.5, 7.0, 5.0, 1.6, 6.0, 7.0, 5.0, 1.4};
     const double far[] = {1e5, -2e5, 3e4, 1.5, 1e5 + 2.0, -2e5 - 1.0, 3e4 + 1.0, 1.7};
     const job jobs[] = {
-        {one, 1, 0.5, 0.6, 3.0, {0.0, 2.0}},        {one, 1, 0.3, 0.6, 3.0, {0.02, 2.0}},
-        {bare, 3, 0.5, 0.5, 2.0, {0.0, 2.0}},       {bare, 1, 0.5, 0.5, 0.0, {0.0, 2.0}},
-        {coincident, 3, 0.5, 0.6, 3.5, {0.0, 2.0}}, {flat, 3, 0.5, 0.4, 0.0, {0.0, 2.0}},
-        {straight, 3, 0.5, 0.1, 0.0, {0.0, 2.0}},   {far, 2, 0.5, 0.6, 3.0, {0.0, 2.0}},
-        {one, 1, 0.5, 50.0, 3.0, {0.0, 2.0}},
+        {one, 1, 0.5, 0.6, 3.0, {.low = 0.0, .high = 2.0}},
+        {one, 1, 0.3, 0.6, 3.0, {.low = 0.02, .high = 2.0}},
+        {bare, 3, 0.5, 0.5, 2.0, {.low = 0.0, .high = 2.0}},
+        {bare, 1, 0.5, 0.5, 0.0, {.low = 0.0, .high = 2.0}},
+        {coincident, 3, 0.5, 0.6, 3.5, {.low = 0.0, .high = 2.0}},
+        {flat, 3, 0.5, 0.4, 0.0, {.low = 0.0, .high = 2.0}},
+        {straight, 3, 0.5, 0.1, 0.0, {.low = 0.0, .high = 2.0}},
+        {far, 2, 0.5, 0.6, 3.0, {.low = 0.0, .high = 2.0}},
+        {one, 1, 0.5, 50.0, 3.0, {.low = 0.0, .high = 2.0}},
     };
     for (size_t n = 0; n < sizeof jobs / sizeof jobs[0]; ++n)
         expect_samples(*state, &jobs[n]);
@@ -231,13 +335,14 @@ static void odd_molecules(void **state) {
 /* Coincident atoms' phi is that of one, times their number. */
 static void band_follows_the_sum(void **state) {
     const double two[] = {0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.5};
-    const job one = {two, 1, 0.5, 0.5, 3.0, {0.5, 1.1}}, both = {two, 2, 0.5, 0.5, 3.0, {1.0, 2.2}};
+    const job one = {two, 1, 0.5, 0.5, 3.0, {.low = 0.5, .high = 1.1}},
+              both = {two, 2, 0.5, 0.5, 3.0, {.low = 1.0, .high = 2.2}};
     assert_int_equal(expect_samples(*state, &one), expect_samples(*state, &both));
 }
 
 static void empty_band_is_an_error(void **state) {
     const double xyzr[4] = {0.0, 0.0, 0.0, 2.0};
-    const ov_band band = {0.0, 2.0}; /* phi at the only lattice point is e^2 */
+    const ov_band band = {.low = 0.0, .high = 2.0}; /* phi at the only lattice point is e^2 */
     ov_lattice lattice;
     ov_samples samples = {0};
     test_check(*state, ov_lattice_create(*state, xyzr, 1, 0.5, 0.0, &lattice));
@@ -248,25 +353,18 @@ static void empty_band_is_an_error(void **state) {
     assert_null(samples.value.memory);
 }
 
-/* Counts the questions in *user; says stop to the third. */
-static bool stop_at_third(uint64_t points, void *user) {
-    uint64_t *const asked = user;
-    (void)points;
-    return ++*asked < 3;
-}
-
 /* Two atoms ten thousand angstrom apart: the space between costs nothing where the band ends above
  * 0, and is refused, before memory runs out, where it does not. */
 static void empty_space_between_atoms(void **state) {
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 5000.0, 300.0, 300.0, 1.7};
-    const ov_band shell = {0.02, 2.0}, everything = {0.0, 2.0};
+    const ov_band shell = {.low = 0.02, .high = 2.0}, everything = {.low = 0.0, .high = 2.0};
     ov_lattice lattice;
     ov_samples samples = {0};
     if (test_small())
         skip();
     test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.5, 3.0, &lattice));
     test_check(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, shell, no_questions, &samples));
-    const job one = {xyzr, 1, 0.5, 0.5, 3.0, {0.02, 2.0}};
+    const job one = {xyzr, 1, 0.5, 0.5, 3.0, {.low = 0.02, .high = 2.0}};
     const size_t single = expect_samples(*state, &one);
     /* the steps differ a little from 0.5, and so does the number of points about an atom */
     assert_true(samples.points.count > 1.9 * (double)single &&
@@ -287,7 +385,7 @@ static void sampling_can_be_stopped(void **state) {
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
     uint64_t asked = 0;
     const ov_sampling sampling = {stop_at_third, &asked};
-    const ov_band band = {0.0, 2.0};
+    const ov_band band = {.low = 0.0, .high = 2.0};
     ov_lattice lattice;
     ov_samples samples = {0};
     test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.6, 1.0, &lattice));
@@ -304,6 +402,9 @@ int main(void) {
         cmocka_unit_test(exterior_points_are_kept),
         cmocka_unit_test(lattice_of_several_pieces),
         cmocka_unit_test(pieces_without_atoms),
+        cmocka_unit_test(guards_on_a_coarser_lattice),
+        cmocka_unit_test(guards_in_pieces),
+        cmocka_unit_test(few_guards_need_little_room),
         cmocka_unit_test(odd_molecules),
         cmocka_unit_test(band_follows_the_sum),
         cmocka_unit_test(empty_band_is_an_error),

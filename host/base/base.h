@@ -15,6 +15,7 @@ struct ovoid_context {
     char *error; /* last failure, owned, may be NULL */
     ovoid_warning_fn warn;
     void *warn_user;
+    bool profile;                          /* devices begin with their launches counted */
     struct ov_device *device;              /* NULL until opened */
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */
 };

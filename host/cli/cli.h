@@ -19,7 +19,8 @@ enum {
     CLI_INPUT = 3,    /* an input cannot be read or makes no sense */
     CLI_OUTPUT = 4,   /* an output cannot be written */
     CLI_DEVICE = 5,   /* no OpenCL device, or none that matches */
-    CLI_COMPUTE = 6   /* out of memory, over a limit, or numbers that are not finite */
+    CLI_COMPUTE = 6,  /* out of memory, over a limit, or numbers that are not finite */
+    CLI_GOAL = 7      /* all went well, but what a fit reached is not what was asked */
 };
 
 /* ---- main.c: messages ----------------------------------------------------------------------- */
@@ -83,7 +84,12 @@ typedef struct cli_number {
  * returns false if it does not fit. */
 bool cli_number_parse(const cli_number *number, const char *text, void *structure);
 
-/* A help entry: name, meaning, and the value in the structure as the default. */
+/* A help entry: the option with its value's name ("--method NAME"), and its meaning. "(default "
+ * and what follows stays together. */
+void cli_option_help(const char *option, const char *meaning, FILE *stream);
+
+/* A help entry: name, meaning, and the value in the structure as the default; a structure of NULL
+ * says that there is none, or that the meaning names it. */
 void cli_number_help(const cli_number *number, const void *structure, FILE *stream);
 
 double cli_number_value(const cli_number *number, const void *structure);
@@ -119,8 +125,9 @@ void cli_remove_when_killed(const char *path);
 
 /* ---- progress.c ----------------------------------------------------------------------------- */
 
-/* Shows the state of a fit in one line of standard error if that is a terminal. */
-void cli_progress_start(bool quiet);
+/* Shows the state of a fit in one line of standard error if that is a terminal. `label` begins the
+ * line and must outlive it; NULL for none. */
+void cli_progress_start(bool quiet, const char *label);
 void cli_progress_show(const ovoid_progress *progress);
 void cli_progress_erase(void);
 
@@ -141,6 +148,32 @@ ovoid_status cli_json_write(ovoid_context *context, const cJSON *json, const cha
 /* Whether a file is a model rather than a molecule: by its extension, else by how it begins.
  * Standard input counts as a model. */
 bool cli_is_model(const char *path);
+
+/* ---- profile.c ------------------------------------------------------------------------------ */
+
+/* Where the time of some work went. {0}, less wanted, is one that does nothing. */
+typedef struct cli_profile {
+    bool wanted;              /* --profile */
+    double began, seconds;    /* of the work, by the host's clock */
+    ovoid_kernel_time *times; /* owned */
+    size_t count;
+    bool known; /* the work is done, and times hold what it launched */
+} cli_profile;
+
+#define CLI_HELP_PROFILE "print which kernels took the device's time"
+
+/* Around the work, with the device opened. */
+ovoid_status cli_profile_begin(cli_profile *profile, ovoid_context *context);
+ovoid_status cli_profile_end(cli_profile *profile, ovoid_context *context);
+void cli_profile_destroy(cli_profile *profile);
+
+/* A blank line and a table: a row per kernel, all else, and the whole work under its name. Nothing
+ * unless known. */
+void cli_profile_print(const cli_profile *profile, const char *whole, FILE *out);
+
+/* The same as `kernels`: an array of objects with name, launches, seconds and share of the whole;
+ * null for what the driver does not tell. Nothing unless known. */
+bool cli_profile_report(const cli_profile *profile, cJSON *report);
 
 /* ---- subcommands ---------------------------------------------------------------------------- */
 

@@ -1,5 +1,6 @@
 #include "fit.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,57 +25,124 @@ static FILE *choose_summary(const fit_job *job) {
 
 /* Asks for every output before the work that it is to hold the result of. */
 static ovoid_status check_outputs(const fit_job *job) {
-    const char *const paths[] = {job->output, job->report, job->trace};
-    for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
-        ovoid_status status = paths[i] ? ovoid_file_check(job->context, paths[i]) : OVOID_OK;
-        if (status != OVOID_OK)
-            return status;
-    }
-    return OVOID_OK;
+    const char *const paths[] = {job->report, job->trace};
+    ovoid_status status = OVOID_OK;
+    for (size_t i = 0; i < job->level_count && status == OVOID_OK; i++)
+        status = ovoid_file_check(job->context, job->levels[i].path);
+    for (size_t i = 0; i < sizeof paths / sizeof *paths && status == OVOID_OK; i++)
+        status = paths[i] ? ovoid_file_check(job->context, paths[i]) : OVOID_OK;
+    return status;
 }
+
+double fit_sample_seconds(const fit_job *job) {
+    double sum = 0.0;
+    for (size_t i = 0; i < job->levels_done; i++)
+        sum += job->levels[i].result.sample_seconds;
+    return sum;
+}
+
+double fit_fit_seconds(const fit_job *job) {
+    double sum = 0.0;
+    for (size_t i = 0; i < job->levels_done; i++)
+        sum += job->levels[i].result.fit_seconds;
+    return sum;
+}
+
+const char *fit_distance(double distance, double above, char text[FIT_DISTANCE_TEXT]) {
+    for (int digits = 4; digits <= 17; digits++) {
+        snprintf(text, FIT_DISTANCE_TEXT, "%.*g", digits, distance);
+        if (!(distance > above) || strtod(text, NULL) > above)
+            break;
+    }
+    return text;
+}
+
+/* ---- the model's header --------------------------------------------------------------------- */
 
 /* Adds a header line to the model. Line breaks and the like, which a file name may hold, become
  * '?'. */
-static ovoid_status annotate(const fit_job *job, const char *key, const char *text) {
+static ovoid_status annotate(const fit_job *job, ovoid_model *model, const char *key,
+                             const char *text) {
     char *clean = strdup(text);
     if (!clean)
         return OVOID_ERROR_MEMORY;
     for (char *c = clean; *c; c++)
         if ((unsigned char)*c < 0x20 || *c == 0x7f)
             *c = '?';
-    ovoid_status status = ovoid_model_annotate(job->context, job->model, key, clean);
+    ovoid_status status = ovoid_model_annotate(job->context, model, key, clean);
     free(clean);
     return status;
 }
 
+/* ", name value" of each, as far as there is room. */
+static size_t append_numbers(const cli_number *numbers, size_t count,
+                             const ovoid_fit_options *options, char *text, size_t size,
+                             size_t used) {
+    for (size_t i = 0; i < count && used < size; i++)
+        used += (size_t)snprintf(text + used, size - used, ", %s %.9g", numbers[i].name,
+                                 cli_number_value(&numbers[i], options));
+    return used;
+}
+
 static void print_settings(const fit_job *job, char *text, size_t size) {
     const ovoid_fit_options *options = &job->options;
-    size_t used =
-        (size_t)snprintf(text, size, "method %s, spacing %.9g, padding %.9g",
-                         fit_method_name(options->method), options->spacing, options->padding);
-    for (size_t i = 0; i < fit_l1_count && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, ", %s %.9g", fit_l1_numbers[i].name,
-                                 cli_number_value(&fit_l1_numbers[i], options));
+    size_t used = (size_t)snprintf(text, size, "method %s, spacing %.9g, padding %.9g",
+                                   fit_method_name(options->method), job->levels[0].result.spacing,
+                                   options->padding);
+    if (options->method == OVOID_METHOD_ADAPTIVE) {
+        used =
+            append_numbers(&fit_goal_numbers[options->adaptive.goal], 1, options, text, size, used);
+        used = append_numbers(fit_adaptive_numbers, fit_adaptive_count, options, text, size, used);
+        if (used < size)
+            snprintf(text + used, size - used, ", mesh-spacing %.9g",
+                     options->adaptive.mesh_spacing);
+        return;
+    }
+    used = append_numbers(fit_l1_numbers, fit_l1_count, options, text, size, used);
     if (used < size)
         snprintf(text + used, size - used, ", kernel %s, first-step %s",
                  fit_kernel_name(options->l1.kernel), fit_first_step_name(options->l1.first_step));
 }
 
+/* What method adaptive reached. */
+static ovoid_status annotate_result(const fit_job *job, size_t level, ovoid_model *model) {
+    const ovoid_fit_result *result = &job->levels[level].result;
+    const double tolerance = job->options.adaptive.tolerance;
+    char text[64], digits[FIT_DISTANCE_TEXT];
+    ovoid_status status = OVOID_OK;
+    if (job->level_count > 1) {
+        snprintf(text, sizeof text, "%zu of %zu", level + 1, job->levels_done);
+        status = annotate(job, model, "level", text);
+    }
+    if (status == OVOID_OK && level == 0)
+        status = annotate(job, model, "goal", result->reached ? "reached" : "not reached");
+    if (status == OVOID_OK && isfinite(result->distance))
+        status =
+            annotate(job, model, "distance", fit_distance(result->distance, tolerance, digits));
+    return status;
+}
+
 /* The model file says where it comes from. */
-static ovoid_status annotate_all(const fit_job *job) {
+static ovoid_status annotate_all(const fit_job *job, size_t level) {
     const ovoid_device_info *device = ovoid_context_device(job->context);
+    ovoid_model *model = job->levels[level].model;
     char text[1024];
     snprintf(text, sizeof text, "ovoid %s", ovoid_version());
-    ovoid_status status = annotate(job, "program", text);
-    if (status != OVOID_OK || (status = annotate(job, "input", job->input)) != OVOID_OK)
+    ovoid_status status = annotate(job, model, "program", text);
+    if (status != OVOID_OK || (status = annotate(job, model, "input", job->input)) != OVOID_OK)
         return status;
     snprintf(text, sizeof text, "%s (%s, driver %s)", device->name, device->platform,
              device->driver);
-    if ((status = annotate(job, "device", text)) != OVOID_OK)
+    if ((status = annotate(job, model, "device", text)) != OVOID_OK)
         return status;
     print_settings(job, text, sizeof text);
-    return annotate(job, "settings", text);
+    status = annotate(job, model, "settings", text);
+    if (status == OVOID_OK && job->options.method == OVOID_METHOD_ADAPTIVE)
+        status = annotate_result(job, level, model);
+    return status;
 }
+
+/* ---- the run -------------------------------------------------------------------------------- */
 
 static ovoid_status read_molecule(fit_job *job) {
     double begin = cli_seconds();
@@ -91,48 +159,115 @@ static ovoid_status open_device(fit_job *job) {
     return status;
 }
 
-static ovoid_status fit(fit_job *job) {
-    ovoid_status status = OVOID_OK;
-    cli_defer_signals();
-    if (job->trace)
-        status = fit_trace_open(&job->tracer, job->context, job->trace);
-    if (status != OVOID_OK)
-        return status;
-    job->options.progress = on_progress;
-    job->options.user = job;
-    cli_progress_start(job->quiet);
-    status = ovoid_fit(job->context, job->molecule, &job->options, &job->model, &job->result);
+/* Whether the molecule allows the goal; says so if not. */
+static bool check_goal(const fit_job *job) {
+    const ovoid_adaptive_options *wanted = &job->options.adaptive;
+    const size_t atoms = ovoid_molecule_atoms(job->molecule);
+    if (job->options.method != OVOID_METHOD_ADAPTIVE || wanted->goal != OVOID_GOAL_ELLIPSOIDS ||
+        wanted->ellipsoids <= atoms)
+        return true;
+    cli_error("--ellipsoids is %u, but %s has only %zu atom%s", (unsigned)wanted->ellipsoids,
+              source_name(job->input), atoms, atoms == 1 ? "" : "s");
+    return false;
+}
+
+/* The goal's model, or after it one with half the ellipsoids of the level before: that one begins
+ * with the atoms, too, for they merge better than what has been fitted. */
+static ovoid_status fit_model(fit_job *job, size_t level) {
+    ovoid_fit_options options = job->options;
+    fit_level *now = &job->levels[level];
+    options.progress = on_progress;
+    options.user = job;
+    if (level > 0) {
+        options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+        options.adaptive.ellipsoids = (uint32_t)(now[-1].result.ellipsoids / 2);
+    }
+    return ovoid_fit(job->context, job->molecule, &options, &now->model, &now->result);
+}
+
+static ovoid_status fit_one(fit_job *job, size_t level) {
+    char label[64];
+    snprintf(label, sizeof label, "level %zu/%u", level + 1, (unsigned)job->level_count);
+    fit_trace_level(&job->tracer, level);
+    cli_progress_start(job->quiet, job->level_count > 1 ? label : NULL);
+    ovoid_status status = fit_model(job, level);
     cli_progress_erase();
+    if (status == OVOID_OK)
+        job->levels_done = level + 1;
     return status;
 }
 
+/* The first level is what was asked; what comes of the others and of the profile does not undo it,
+ * and only sets *code. */
+static ovoid_status fit(fit_job *job, int *code) {
+    ovoid_status status = OVOID_OK;
+    cli_defer_signals();
+    if (job->trace)
+        status = fit_trace_open(&job->tracer, job->context, job->trace, job->options.method);
+    if (status == OVOID_OK)
+        status = cli_profile_begin(&job->profile, job->context);
+    if (status == OVOID_OK)
+        status = fit_one(job, 0);
+    if (status != OVOID_OK)
+        return status;
+    for (size_t i = 1; i < job->level_count && job->levels[i - 1].result.ellipsoids > 1; i++) {
+        const ovoid_status further = fit_one(job, i);
+        if (cli_interrupted())
+            return OVOID_ERROR_CANCELLED;
+        if (further != OVOID_OK) {
+            *code = cli_failure(job->context, further, CLI_OUTPUT);
+            break;
+        }
+    }
+    const ovoid_status profiled = cli_profile_end(&job->profile, job->context);
+    if (profiled != OVOID_OK)
+        *code = cli_failure(job->context, profiled, CLI_OUTPUT);
+    return OVOID_OK;
+}
+
 /* Compares the surfaces. The model is worth more than its measures: without them it is written,
- * too. *code is CLI_OK where there is nothing to measure, such as a model without a surface. */
-static void measure(fit_job *job, int *code) {
-    *code = CLI_OK;
-    if (!job->measure)
-        return;
+ * too. CLI_OK where there is nothing to measure, such as a model without a surface. */
+static int measure(fit_job *job, fit_level *level) {
+    int code = CLI_OK;
     double begin = cli_seconds();
     job->measuring.isovalue = job->options.isovalue;
     ovoid_status status =
-        ovoid_measure(job->context, job->molecule, job->model, &job->measuring, &job->measures);
-    job->measured = status == OVOID_OK;
+        ovoid_measure(job->context, job->molecule, level->model, &job->measuring, &level->measures);
+    level->measured = status == OVOID_OK;
     if (status == OVOID_ERROR_EMPTY) {
         if (!job->quiet)
             cli_warning("not measured: %s", ovoid_context_error(job->context));
     } else if (status != OVOID_OK && !cli_interrupted()) {
-        *code = cli_failure(job->context, status, CLI_OUTPUT);
+        code = cli_failure(job->context, status, CLI_OUTPUT);
     }
-    job->measure_seconds = cli_seconds() - begin;
+    job->measure_seconds += cli_seconds() - begin;
+    return code;
 }
 
-/* Writes the model, then the trace, then the report, which tells how long the others took. The
+static int measure_all(fit_job *job) {
+    int code = CLI_OK;
+    for (size_t i = 0; job->measure && i < job->levels_done && !cli_interrupted(); i++) {
+        const int one = measure(job, &job->levels[i]);
+        code = code == CLI_OK ? one : code;
+    }
+    return code;
+}
+
+static ovoid_status write_models(fit_job *job) {
+    ovoid_status status = OVOID_OK;
+    for (size_t i = 0; i < job->levels_done && status == OVOID_OK; i++) {
+        status = annotate_all(job, i);
+        if (status == OVOID_OK)
+            status = ovoid_model_write(job->context, job->levels[i].model, job->levels[i].path);
+    }
+    return status;
+}
+
+/* Writes the models, then the trace, then the report, which tells how long the others took. The
  * model is worth more than the others: their failure does not undo it. */
 static int write_outputs(fit_job *job) {
     double begin = cli_seconds();
-    ovoid_status status = annotate_all(job);
-    if (status == OVOID_OK)
-        status = ovoid_model_write(job->context, job->model, job->output);
+    ovoid_status status = write_models(job);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     fit_trace_commit(&job->tracer);
@@ -147,25 +282,50 @@ static int write_outputs(fit_job *job) {
     return code;
 }
 
+/* Says what was reached instead of the goal. */
+static int compare_with_goal(const fit_job *job) {
+    const ovoid_adaptive_options *wanted = &job->options.adaptive;
+    const ovoid_fit_result *result = &job->levels[0].result;
+    char text[FIT_DISTANCE_TEXT];
+    if (result->reached)
+        return CLI_OK;
+    if (wanted->goal != OVOID_GOAL_TOLERANCE)
+        cli_warning("the goal was not reached: the model has %llu ellipsoid%s",
+                    (unsigned long long)result->ellipsoids, result->ellipsoids == 1 ? "" : "s");
+    else if (isnan(result->distance))
+        cli_warning("the goal was not reached: the model has no surface to be within %.9g Å",
+                    wanted->tolerance);
+    else
+        cli_warning("the goal was not reached: the outer surfaces are %s Å apart, not within %.9g "
+                    "Å; this is the best model found%s",
+                    fit_distance(result->distance, wanted->tolerance, text), wanted->tolerance,
+                    wanted->effort < 10 ? ", and a higher --effort may find a better one" : "");
+    return CLI_GOAL;
+}
+
 static int run(fit_job *job) {
     ovoid_status status = check_outputs(job);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     if ((status = read_molecule(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
+    if (!check_goal(job))
+        return CLI_USAGE;
     if ((status = open_device(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     fit_summary_before(job);
-    int measured = CLI_OK;
-    status = fit(job);
+    int levels = CLI_OK, measured = CLI_OK;
+    status = fit(job, &levels);
     if (status == OVOID_OK && !cli_interrupted())
-        measure(job, &measured);
+        measured = measure_all(job);
     if (status == OVOID_OK && cli_interrupted())
         status = OVOID_ERROR_CANCELLED;
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
-    int written = write_outputs(job);
-    return written == CLI_OK ? measured : written;
+    const int written = write_outputs(job);
+    if (written != CLI_OK || levels != CLI_OK || measured != CLI_OK)
+        return written != CLI_OK ? written : levels != CLI_OK ? levels : measured;
+    return compare_with_goal(job);
 }
 
 int cli_fit(int argc, char **argv) {
@@ -182,7 +342,11 @@ int cli_fit(int argc, char **argv) {
         }
     }
     fit_trace_destroy(&job.tracer);
-    ovoid_model_destroy(&job.model);
+    for (size_t i = 0; i < FIT_LEVELS_MAX; i++) {
+        ovoid_model_destroy(&job.levels[i].model);
+        free(job.levels[i].own_path);
+    }
+    cli_profile_destroy(&job.profile);
     ovoid_molecule_destroy(&job.molecule);
     ovoid_context_destroy(&job.context);
     free(job.default_output);

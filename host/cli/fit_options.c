@@ -1,7 +1,9 @@
 #include "fit.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #define REAL(name, member, low, above, high, below, unit, help)                                    \
     { name, CLI_REAL, offsetof(ovoid_fit_options, member), low, high, above, below, unit, help }
@@ -17,9 +19,30 @@ const cli_number fit_surface_numbers[] = {
     REAL("spacing", spacing, 0, true, 1e3, false, "Å",
          "distance of the points where the fields are compared"),
     REAL("padding", padding, 0, false, 1e3, false, "Å",
-         "room for points about the outermost atom centres"),
+         "room for points about the outermost atom centres; method adaptive takes what the field "
+         "needs, if that is more"),
 };
 const size_t fit_surface_count = sizeof fit_surface_numbers / sizeof *fit_surface_numbers;
+
+const cli_number fit_goal_numbers[] = {
+    REAL("tolerance", adaptive.tolerance, 0, true, 1e3, false, "Å",
+         "the outer surfaces of molecule and model are nowhere further apart than this, with as "
+         "few ellipsoids as are found to do"),
+    COUNT("ellipsoids", adaptive.ellipsoids, 1, UINT32_MAX,
+          "so many ellipsoids, no more than atoms, as near to the surface as they get"),
+    REAL("ratio", adaptive.ratio, 0, true, 1, false, "",
+         "so many ellipsoids per atom, at least one of them"),
+};
+const size_t fit_goal_count = sizeof fit_goal_numbers / sizeof *fit_goal_numbers;
+
+const cli_number fit_adaptive_numbers[] = {
+    COUNT("effort", adaptive.effort, 1, 10,
+          "how much is tried for a better model, up to 10: more starts, more repairs, more time"),
+    COUNT("steps", adaptive.steps, 0, UINT32_MAX,
+          "steps of each refinement (Levenberg-Marquardt) at most; 0 leaves the merged Gaussians "
+          "as they are"),
+};
+const size_t fit_adaptive_count = sizeof fit_adaptive_numbers / sizeof *fit_adaptive_numbers;
 
 const cli_number fit_l1_numbers[] = {
     COUNT("iterations", l1.iterations, 1, UINT32_MAX, "iterations at most: MaxNiter"),
@@ -43,7 +66,19 @@ const cli_number fit_l1_numbers[] = {
 };
 const size_t fit_l1_count = sizeof fit_l1_numbers / sizeof *fit_l1_numbers;
 
-static const cli_number mesh_spacing = {
+const cli_number fit_levels_number = {
+    "levels",
+    CLI_COUNT,
+    offsetof(fit_job, level_count),
+    1,
+    FIT_LEVELS_MAX,
+    false,
+    false,
+    "",
+    "levels of detail: so many models, each with half the ellipsoids of the one before, down to "
+    "one; those after FILE.ovoid go to FILE.level2.ovoid, FILE.level3.ovoid and so on"};
+
+const cli_number fit_mesh_spacing_number = {
     "mesh-spacing",
     CLI_REAL,
     offsetof(ovoid_measure_options, spacing),
@@ -52,12 +87,8 @@ static const cli_number mesh_spacing = {
     true,
     false,
     "Å",
-    "of the meshes on which the model's surface is measured at the end"};
-
-enum {
-    SURFACE_COUNT = sizeof fit_surface_numbers / sizeof *fit_surface_numbers,
-    L1_COUNT = sizeof fit_l1_numbers / sizeof *fit_l1_numbers
-};
+    "of the meshes on which the surfaces are compared, at the end and by method adaptive on the "
+    "way"};
 
 /* Values of the long options; those of the numbers follow. */
 enum {
@@ -72,6 +103,8 @@ enum {
     FIRST_STEP,
     NO_MEASURE,
     MESH_SPACING,
+    LEVELS,
+    PROFILE,
     HELP,
     NUMBERS
 };
@@ -88,18 +121,48 @@ static const struct option named[] = {
     {"first-step", required_argument, NULL, FIRST_STEP},
     {"no-measure", no_argument, NULL, NO_MEASURE},
     {"mesh-spacing", required_argument, NULL, MESH_SPACING},
+    {"levels", required_argument, NULL, LEVELS},
+    {"profile", no_argument, NULL, PROFILE},
     {"help", no_argument, NULL, HELP},
 };
-enum { NAMED_COUNT = sizeof named / sizeof *named };
+
+enum {
+    NAMED_COUNT = sizeof named / sizeof *named,
+    SURFACE_COUNT = sizeof fit_surface_numbers / sizeof *fit_surface_numbers,
+    GOAL_COUNT = sizeof fit_goal_numbers / sizeof *fit_goal_numbers,
+    ADAPTIVE_COUNT = sizeof fit_adaptive_numbers / sizeof *fit_adaptive_numbers,
+    L1_COUNT = sizeof fit_l1_numbers / sizeof *fit_l1_numbers,
+    /* The first of each group. */
+    GOALS = NUMBERS + SURFACE_COUNT,
+    ADAPTIVES = GOALS + GOAL_COUNT,
+    L1S = ADAPTIVES + ADAPTIVE_COUNT,
+    NUMBERS_END = L1S + L1_COUNT,
+    NUMBER_COUNT = NUMBERS_END - NUMBERS
+};
+
+/* The command line as far as it has been read. */
+typedef struct parser {
+    fit_job *job;
+    const char *goal;     /* the option that set it, NULL for none */
+    const char *adaptive; /* the last option that method adaptive alone has, NULL for none */
+    const char *l1;       /* the same of method l1 */
+    bool iterations, sparse_iterations;
+} parser;
 
 static const cli_number *number_of(int option) {
-    size_t index = (size_t)(option - NUMBERS);
-    return index < SURFACE_COUNT ? &fit_surface_numbers[index]
-                                 : &fit_l1_numbers[index - SURFACE_COUNT];
+    if (option >= L1S)
+        return &fit_l1_numbers[option - L1S];
+    if (option >= ADAPTIVES)
+        return &fit_adaptive_numbers[option - ADAPTIVES];
+    if (option >= GOALS)
+        return &fit_goal_numbers[option - GOALS];
+    return &fit_surface_numbers[option - NUMBERS];
 }
 
 const char *fit_method_name(ovoid_method method) {
     switch (method) {
+    case OVOID_METHOD_ADAPTIVE:
+        return "adaptive";
     case OVOID_METHOD_L1:
         return "l1";
     }
@@ -126,82 +189,14 @@ const char *fit_first_step_name(ovoid_first_step first_step) {
     return "unknown";
 }
 
-void cli_fit_help(FILE *stream) {
-    ovoid_fit_options defaults;
-    ovoid_measure_options measuring;
-    ovoid_fit_options_init(&defaults);
-    ovoid_measure_options_init(&measuring);
-    fprintf(
-        stream,
-        "Usage: ovoid fit MOLECULE [OPTION]...\n"
-        "\n"
-        "Fits a sparse model, a few rotated ellipsoid Gaussians, to the Gaussian surface of the\n"
-        "molecule in the file MOLECULE: PQR or XYZR, also compressed with gzip, or - for\n"
-        "standard input. Prints what was done and writes the model to a text file.\n"
-        "\n"
-        "Files:\n"
-        "  -o, --output FILE   where the model goes, - for standard output (default: the name of\n"
-        "                      the molecule with the extension .ovoid, in the current folder)\n"
-        "  --report FILE       write numbers about the fit as JSON\n"
-        "  --trace FILE        write a line per iteration as CSV\n"
-        "  --format NAME       of the molecule: pqr or xyzr (default: by its extension, else by\n"
-        "                      its contents)\n"
-        "\n"
-        "Files appear whole at the end or not at all; those that exist are replaced.\n"
-        "\n"
-        "Running:\n"
-        "  --device SELECTOR   number, type (cpu, gpu) or part of the name of a device that\n"
-        "                      'ovoid devices' lists (default: OVOID_DEVICE, else the first GPU,\n"
-        "                      else the first device)\n"
-        "  --method NAME       how to fit: l1, Algorithm 1 of Gui, Chen and Lu, arXiv:1909.09095\n"
-        "                      (default %s)\n"
-        "  -q, --quiet         print errors only\n"
-        "  -h, --help          show this help\n"
-        "\n"
-        "The surface:\n",
-        fit_method_name(defaults.method));
-    for (size_t i = 0; i < fit_surface_count; i++)
-        cli_number_help(&fit_surface_numbers[i], &defaults, stream);
-    fputs("\nThe measures of the surface at the end:\n", stream);
-    cli_number_help(&mesh_spacing, &measuring, stream);
-    fputs("  --no-measure        leave them out\n\nMethod l1:\n", stream);
-    fprintf(
-        stream,
-        "  --kernel NAME       what an atom's Gaussian may become: ellipsoid (everything about\n"
-        "                      it moves), or sphere (stays where it is and as wide, only its\n"
-        "                      amplitude moves: the sparse RBF model in Table 1 of the paper)\n"
-        "                      (default %s)\n",
-        fit_kernel_name(defaults.l1.kernel));
-    for (size_t i = 0; i < fit_l1_count; i++)
-        cli_number_help(&fit_l1_numbers[i], &defaults, stream);
-    fprintf(
-        stream,
-        "  --first-step NAME   line search: what is tried first, secant (the inverse curvature\n"
-        "                      along the last step, where it is defined) or grow (default %s)\n",
-        fit_first_step_name(defaults.l1.first_step));
-    fprintf(stream,
-            "\n"
-            "With --iterations alone, --sparse-iterations keeps its share of %.3g %%.\n"
-            "\n"
-            "Examples:\n"
-            "  ovoid fit molecule.pqr\n"
-            "  ovoid fit molecule.pqr -o model.ovoid --report report.json --device gpu\n"
-            "  ovoid fit molecule.pqr --iterations 2000        a quick look\n"
-            "  ovoid fit - -o model.ovoid < molecule.pqr       from standard input\n"
-            "\n",
-            100.0 * defaults.l1.sparse_iterations / defaults.l1.iterations);
-    cli_print_environment(stream);
-    putc('\n', stream);
-    cli_print_exit_codes(stream);
-}
-
 static bool parse_method(const char *text, ovoid_method *method) {
-    if (strcmp(text, fit_method_name(OVOID_METHOD_L1)) != 0) {
-        cli_error("--method takes l1, not '%s'", text);
-        return false;
-    }
-    *method = OVOID_METHOD_L1;
-    return true;
+    for (int m = OVOID_METHOD_ADAPTIVE; m <= OVOID_METHOD_L1; m++)
+        if (strcmp(text, fit_method_name((ovoid_method)m)) == 0) {
+            *method = (ovoid_method)m;
+            return true;
+        }
+    cli_error("--method takes adaptive or l1, not '%s'", text);
+    return false;
 }
 
 static bool parse_kernel(const char *text, ovoid_kernel *kernel) {
@@ -228,52 +223,54 @@ static bool parse_first_step(const char *text, ovoid_first_step *first_step) {
     return true;
 }
 
-/* What goes where must be told apart before anything is written. */
-static bool check_files(const fit_job *job) {
-    const struct {
-        const char *option, *path;
-    } files[] = {{"the molecule", strcmp(job->input, "-") == 0 ? NULL : job->input},
-                 {"the model (-o)", job->output},
-                 {"the report (--report)", job->report},
-                 {"the trace (--trace)", job->trace}};
-    for (size_t i = 0; i < 4; i++)
-        for (size_t j = i + 1; j < 4; j++) {
-            if (!files[i].path || !files[j].path || !cli_same_file(files[i].path, files[j].path))
-                continue;
-            if (strcmp(files[i].path, "-") == 0)
-                cli_error("%s and %s cannot both go to standard output", files[i].option,
-                          files[j].option);
-            else
-                cli_error("%s and %s are the same file '%s'", files[i].option, files[j].option,
-                          files[j].path);
-            return false;
-        }
+static bool parse_goal(parser *p, int option) {
+    const char *name = number_of(option)->name;
+    if (p->goal && p->goal != name) {
+        cli_error("--%s and --%s are both goals, and a fit has one (see 'ovoid fit --help')",
+                  p->goal, name);
+        return false;
+    }
+    p->goal = p->adaptive = name;
+    p->job->options.adaptive.goal = (ovoid_goal)(option - GOALS);
     return true;
 }
 
-static bool complete(int argc, char **argv, fit_job *job, bool iterations, bool sparse) {
-    if (optind == argc) {
-        cli_error("which molecule? Name its file: ovoid fit MOLECULE (see 'ovoid fit --help')");
+static bool parse_number(parser *p, int option, const char *text) {
+    const cli_number *number = number_of(option);
+    if (!cli_number_parse(number, text, &p->job->options))
+        return false;
+    if (option >= L1S)
+        p->l1 = number->name;
+    else if (option >= ADAPTIVES)
+        p->adaptive = number->name;
+    else if (option >= GOALS)
+        return parse_goal(p, option);
+    p->iterations |= strcmp(number->name, "iterations") == 0;
+    p->sparse_iterations |= strcmp(number->name, "sparse-iterations") == 0;
+    return true;
+}
+
+/* Options of the other method would have no effect. */
+static bool check_method(const parser *p) {
+    const ovoid_method method = p->job->options.method;
+    if (method == OVOID_METHOD_ADAPTIVE && p->l1) {
+        cli_error("--%s is an option of method l1, and the method is adaptive: add --method l1, or "
+                  "leave it out",
+                  p->l1);
         return false;
     }
-    if (optind + 1 < argc) {
-        cli_error("one molecule at a time, but '%s' follows '%s' (see 'ovoid fit --help')",
-                  argv[optind + 1], argv[optind]);
+    if (method == OVOID_METHOD_L1 && p->adaptive) {
+        cli_error("--%s is an option of method adaptive, and the method is l1", p->adaptive);
         return false;
     }
-    job->input = argv[optind];
-    if (!job->output && strcmp(job->input, "-") == 0) {
-        cli_error("a molecule from standard input has no name: name the model's file with -o");
-        return false;
-    }
-    if (!job->output)
-        job->output = job->default_output = source_output(job->input, ".ovoid");
-    if (!job->output) {
-        cli_error("out of memory");
-        return false;
-    }
-    ovoid_l1_options *l1 = &job->options.l1;
-    if (iterations && !sparse) {
+    return true;
+}
+
+/* What depends on other options. */
+static bool complete_options(const parser *p) {
+    ovoid_fit_options *options = &p->job->options;
+    ovoid_l1_options *l1 = &options->l1;
+    if (p->iterations && !p->sparse_iterations) {
         ovoid_fit_options defaults;
         ovoid_fit_options_init(&defaults);
         l1->sparse_iterations = (uint32_t)((uint64_t)l1->iterations *
@@ -284,78 +281,186 @@ static bool complete(int argc, char **argv, fit_job *job, bool iterations, bool 
                   (unsigned)l1->sparse_iterations, (unsigned)l1->iterations);
         return false;
     }
-    return check_files(job);
+    options->adaptive.mesh_spacing = p->job->measuring.spacing;
+    return true;
+}
+
+/* "model.ovoid" as "model.level2.ovoid"; NULL without memory. */
+static char *level_path(const char *path, size_t level) {
+    const char *slash = strrchr(path, '/');
+    const char *base = slash ? slash + 1 : path;
+    const char *dot = strrchr(base, '.');
+    if (!dot || dot == base) /* a dot in front makes no extension */
+        dot = base + strlen(base);
+    const size_t size = strlen(path) + 32;
+    char *name = malloc(size);
+    if (name)
+        snprintf(name, size, "%.*s.level%zu%s", (int)(dot - path), path, level + 1, dot);
+    return name;
+}
+
+static bool out_of_memory(void) {
+    cli_error("out of memory");
+    return false;
+}
+
+/* Names every level's file. */
+static bool complete_outputs(fit_job *job) {
+    struct stat info;
+    if (!job->output && strcmp(job->input, "-") == 0) {
+        cli_error("a molecule from standard input has no name: name the model's file with -o");
+        return false;
+    }
+    if (!job->output)
+        job->output = job->default_output = source_output(job->input, ".ovoid");
+    if (!job->output)
+        return out_of_memory();
+    job->levels[0].path = job->output;
+    if (job->level_count == 1)
+        return true;
+    if (strcmp(job->output, "-") == 0) {
+        cli_error("--levels writes several models, which standard output cannot take: name the "
+                  "first one's file with -o");
+        return false;
+    }
+    /* A folder is refused as for one model. */
+    if (stat(job->output, &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode)) {
+        cli_error("--levels writes several models, but '%s' is no regular file", job->output);
+        return false;
+    }
+    for (size_t i = 1; i < job->level_count; i++) {
+        job->levels[i].path = job->levels[i].own_path = level_path(job->output, i);
+        if (!job->levels[i].path)
+            return out_of_memory();
+    }
+    return true;
+}
+
+typedef struct named_file {
+    const char *what, *path; /* path NULL: none */
+} named_file;
+
+static bool check_pair(named_file a, named_file b) {
+    if (!a.path || !b.path || !cli_same_file(a.path, b.path))
+        return true;
+    if (strcmp(a.path, "-") == 0)
+        cli_error("%s and %s cannot both go to standard output", a.what, b.what);
+    else
+        cli_error("%s and %s are the same file '%s'", a.what, b.what, b.path);
+    return false;
+}
+
+/* What goes where must be told apart before anything is written. */
+static bool check_files(const fit_job *job) {
+    enum { LEVELS_AT = 4, MOST = LEVELS_AT + FIT_LEVELS_MAX };
+    char what[FIT_LEVELS_MAX][32];
+    named_file files[MOST] = {{"the molecule", strcmp(job->input, "-") == 0 ? NULL : job->input},
+                              {"the model (-o)", job->output},
+                              {"the report (--report)", job->report},
+                              {"the trace (--trace)", job->trace}};
+    size_t count = LEVELS_AT;
+    for (size_t level = 1; level < job->level_count; level++) {
+        snprintf(what[level], sizeof what[level], "the model of level %zu", level + 1);
+        files[count++] = (named_file){what[level], job->levels[level].path};
+    }
+    for (size_t i = 0; i < count; i++)
+        for (size_t j = i + 1; j < count; j++)
+            if (!check_pair(files[i], files[j]))
+                return false;
+    return true;
+}
+
+static bool complete(int argc, char **argv, const parser *p) {
+    if (optind == argc) {
+        cli_error("which molecule? Name its file: ovoid fit MOLECULE (see 'ovoid fit --help')");
+        return false;
+    }
+    if (optind + 1 < argc) {
+        cli_error("one molecule at a time, but '%s' follows '%s' (see 'ovoid fit --help')",
+                  argv[optind + 1], argv[optind]);
+        return false;
+    }
+    p->job->input = argv[optind];
+    return check_method(p) && complete_options(p) && complete_outputs(p->job) &&
+           check_files(p->job);
 }
 
 static void fill_long_options(struct option *all) {
     memcpy(all, named, sizeof named);
-    for (int i = 0; i < SURFACE_COUNT + L1_COUNT; i++)
+    for (int i = 0; i < NUMBER_COUNT; i++)
         all[NAMED_COUNT + i] =
             (struct option){number_of(NUMBERS + i)->name, required_argument, NULL, NUMBERS + i};
-    all[NAMED_COUNT + SURFACE_COUNT + L1_COUNT] = (struct option){NULL, 0, NULL, 0};
+    all[NAMED_COUNT + NUMBER_COUNT] = (struct option){NULL, 0, NULL, 0};
+}
+
+/* One option that is no number of ovoid_fit_options. */
+static bool parse_named(parser *p, int option) {
+    fit_job *job = p->job;
+    switch (option) {
+    case 'o':
+    case OUTPUT:
+        job->output = optarg;
+        return true;
+    case METHOD:
+        return parse_method(optarg, &job->options.method);
+    case DEVICE:
+        job->device = optarg;
+        return true;
+    case REPORT:
+        job->report = optarg;
+        return true;
+    case TRACE:
+        job->trace = optarg;
+        return true;
+    case 'q':
+    case QUIET:
+        job->quiet = true;
+        return true;
+    case FORMAT:
+        return source_parse_molecule(optarg, &job->format);
+    case KERNEL:
+        p->l1 = "kernel";
+        return parse_kernel(optarg, &job->options.l1.kernel);
+    case FIRST_STEP:
+        p->l1 = "first-step";
+        return parse_first_step(optarg, &job->options.l1.first_step);
+    case NO_MEASURE:
+        job->measure = false;
+        return true;
+    case PROFILE:
+        job->profile.wanted = true;
+        return true;
+    case LEVELS:
+        p->adaptive = fit_levels_number.name;
+        return cli_number_parse(&fit_levels_number, optarg, job);
+    default: /* MESH_SPACING */
+        return cli_number_parse(&fit_mesh_spacing_number, optarg, &job->measuring);
+    }
 }
 
 bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
-    struct option all[NAMED_COUNT + SURFACE_COUNT + L1_COUNT + 1];
-    bool iterations = false, sparse = false, good = true;
+    struct option all[NAMED_COUNT + NUMBER_COUNT + 1];
+    parser p = {.job = job};
+    bool good = true;
     int option;
     fill_long_options(all);
     ovoid_fit_options_init(&job->options);
     ovoid_measure_options_init(&job->measuring);
     job->measure = true;
+    job->level_count = 1;
     opterr = 0;
     *code = CLI_USAGE;
     while (good && (option = getopt_long(argc, argv, ":o:qh", all, NULL)) != -1) {
-        switch (option) {
-        case 'o':
-        case OUTPUT:
-            job->output = optarg;
-            break;
-        case METHOD:
-            good = parse_method(optarg, &job->options.method);
-            break;
-        case DEVICE:
-            job->device = optarg;
-            break;
-        case REPORT:
-            job->report = optarg;
-            break;
-        case TRACE:
-            job->trace = optarg;
-            break;
-        case 'q':
-        case QUIET:
-            job->quiet = true;
-            break;
-        case FORMAT:
-            good = source_parse_molecule(optarg, &job->format);
-            break;
-        case KERNEL:
-            good = parse_kernel(optarg, &job->options.l1.kernel);
-            break;
-        case FIRST_STEP:
-            good = parse_first_step(optarg, &job->options.l1.first_step);
-            break;
-        case NO_MEASURE:
-            job->measure = false;
-            break;
-        case MESH_SPACING:
-            good = cli_number_parse(&mesh_spacing, optarg, &job->measuring);
-            break;
-        case 'h':
-        case HELP:
+        if (option == 'h' || option == HELP) {
             cli_fit_help(stdout);
             *code = CLI_OK;
             return false;
-        default:
-            if (option < NUMBERS) {
-                *code = cli_bad_option("fit", option, argv, all);
-                return false;
-            }
-            good = cli_number_parse(number_of(option), optarg, &job->options);
-            iterations |= strcmp(number_of(option)->name, "iterations") == 0;
-            sparse |= strcmp(number_of(option)->name, "sparse-iterations") == 0;
         }
+        if (option == '?' || option == ':') {
+            *code = cli_bad_option("fit", option, argv, all);
+            return false;
+        }
+        good = option >= NUMBERS ? parse_number(&p, option, optarg) : parse_named(&p, option);
     }
-    return good && complete(argc, argv, job, iterations, sparse);
+    return good && complete(argc, argv, &p);
 }

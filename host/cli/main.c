@@ -134,6 +134,7 @@ void cli_print_exit_codes(FILE *stream) {
           "  4    an output cannot be written\n"
           "  5    no OpenCL device, or none that matches\n"
           "  6    out of memory, over a limit, or numbers that are not finite\n"
+          "  7    a fit did not reach its goal: the best model it found is written\n"
           "  130  interrupted with Ctrl-C (143: terminated, 129: hung up)\n",
           stream);
 }

@@ -20,7 +20,8 @@ typedef struct measure_job {
     ovoid_measure_options options;
     measure_row *rows; /* owned; none: at the model's isovalue */
     size_t row_count;
-    FILE *summary; /* NULL: none */
+    cli_profile profile; /* of all rows; `wanted` was asked, the rest came of it */
+    FILE *summary;       /* NULL: none */
     ovoid_context *context;
     ovoid_molecule *molecule;
     ovoid_model *model;
@@ -58,7 +59,8 @@ void cli_measure_help(FILE *stream) {
           "One of the inputs can be - for standard input. Files appear whole at the end or not\n"
           "at all; those that exist are replaced.\n"
           "\n"
-          "Running:\n" CLI_HELP_RUNNING "\n"
+          "Running:\n" CLI_HELP_RUNNING "  --profile           " CLI_HELP_PROFILE "\n"
+          "\n"
           "The surfaces:\n"
           "  --isovalue X[,X]... measure where the fields have these values (default: the\n"
           "                      model's)\n",
@@ -144,13 +146,14 @@ static bool complete(int argc, char **argv, measure_job *job) {
 }
 
 static bool parse(int argc, char **argv, measure_job *job, int *code) {
-    enum { REPORT = 256, DEVICE, FORMAT, VERTICES, ISOVALUE, SPACING, QUIET, HELP };
+    enum { REPORT = 256, DEVICE, FORMAT, VERTICES, ISOVALUE, SPACING, PROFILE, QUIET, HELP };
     static const struct option options[] = {{"report", required_argument, NULL, REPORT},
                                             {"device", required_argument, NULL, DEVICE},
                                             {"format", required_argument, NULL, FORMAT},
                                             {"vertices", required_argument, NULL, VERTICES},
                                             {"isovalue", required_argument, NULL, ISOVALUE},
                                             {"spacing", required_argument, NULL, SPACING},
+                                            {"profile", no_argument, NULL, PROFILE},
                                             {"quiet", no_argument, NULL, QUIET},
                                             {"help", no_argument, NULL, HELP},
                                             {NULL, 0, NULL, 0}};
@@ -178,6 +181,9 @@ static bool parse(int argc, char **argv, measure_job *job, int *code) {
             break;
         case SPACING:
             good = cli_number_parse(&spacing_number, optarg, &job->options);
+            break;
+        case PROFILE:
+            job->profile.wanted = true;
             break;
         case 'q':
         case QUIET:
@@ -245,6 +251,16 @@ static ovoid_status measure_rows(measure_job *job) {
     return status;
 }
 
+static void print_rows(const measure_job *job, FILE *out) {
+    putc('\n', out);
+    measures_print_heading(out);
+    for (size_t i = 0; i < job->row_count; i++)
+        if (job->rows[i].measured)
+            measures_print_row(out, job->rows[i].isovalue, &job->rows[i].measures);
+        else
+            fprintf(out, "%-11.6g  no surface\n", job->rows[i].isovalue);
+}
+
 static void print_after(const measure_job *job) {
     double mesh = 0.0, distances = 0.0;
     FILE *out = job->summary;
@@ -266,15 +282,9 @@ static void print_after(const measure_job *job) {
     if (job->report)
         fprintf(out, "report    written to %s\n",
                 strcmp(job->report, "-") == 0 ? "standard output" : job->report);
-    if (job->row_count == 1)
-        return;
-    putc('\n', out);
-    measures_print_heading(out);
-    for (size_t i = 0; i < job->row_count; i++)
-        if (job->rows[i].measured)
-            measures_print_row(out, job->rows[i].isovalue, &job->rows[i].measures);
-        else
-            fprintf(out, "%-11.6g  no surface\n", job->rows[i].isovalue);
+    if (job->row_count > 1)
+        print_rows(job, out);
+    cli_profile_print(&job->profile, "measure", out);
 }
 
 /* ---- report --------------------------------------------------------------------------------- */
@@ -313,7 +323,7 @@ static bool fill_report(cJSON *json, const measure_job *job) {
         if (!good)
             cJSON_Delete(row);
     }
-    return good;
+    return good && cli_profile_report(&job->profile, json);
 }
 
 static ovoid_status write_report(const measure_job *job) {
@@ -337,7 +347,12 @@ static int run(measure_job *job) {
     if ((status = ovoid_context_open_device(job->context, job->device)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     print_before(job);
-    if ((status = measure_rows(job)) != OVOID_OK)
+    status = cli_profile_begin(&job->profile, job->context);
+    if (status == OVOID_OK)
+        status = measure_rows(job);
+    if (status == OVOID_OK)
+        status = cli_profile_end(&job->profile, job->context);
+    if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
     cli_defer_signals(); /* a file under way has to be finished or removed */
     if (job->report && (status = write_report(job)) != OVOID_OK)
@@ -358,6 +373,7 @@ int cli_measure(int argc, char **argv) {
     for (size_t i = 0; job.rows && i < job.row_count; i++)
         free(job.rows[i].error);
     free(job.rows);
+    cli_profile_destroy(&job.profile);
     ovoid_model_destroy(&job.model);
     ovoid_molecule_destroy(&job.molecule);
     ovoid_context_destroy(&job.context);

@@ -49,6 +49,9 @@ void measures_print(FILE *stream, const ovoid_measures *measures,
                 "%.3g Å)\n",
                 measures->distances.hausdorff, measures->distances_outer.hausdorff,
                 measures->distances.mean, measures->distances_outer.mean);
+    if (options->distances)
+        fprintf(stream, "deviation %.4g Å: largest of an outer surface from the other surface\n",
+                measures->deviation);
     fprintf(stream, "mesh      spacing %.9g Å, %s vertices\n", options->spacing,
             measures_vertices_name(options->vertices));
 }
@@ -102,6 +105,8 @@ bool measures_report(cJSON *object, const ovoid_measures *measures,
         !add_counts(object, "components", measures->components_original,
                     measures->components_sparse) ||
         !add_counts(object, "components_outer", measures->outer_original, measures->outer_sparse))
+        return false;
+    if (options->distances && !cJSON_AddNumberToObject(object, "deviation", measures->deviation))
         return false;
     if (options->distances &&
         !add_distances(object, &measures->distances, &measures->distances_outer))

@@ -74,7 +74,7 @@ static int columns(const char *word, size_t length) {
 static void print_wrapped(const char *text, FILE *stream) {
     int column = HELP_INDENT;
     while (*text) {
-        bool last = strncmp(text, "(default", 8) == 0; /* and not to be torn apart */
+        bool last = strncmp(text, "(default ", 9) == 0; /* and not to be torn apart */
         size_t length = last ? strlen(text) : strcspn(text, " ");
         int width = columns(text, length);
         bool first = column == HELP_INDENT;
@@ -91,13 +91,24 @@ static void print_wrapped(const char *text, FILE *stream) {
     putc('\n', stream);
 }
 
+void cli_option_help(const char *option, const char *meaning, FILE *stream) {
+    int used = fprintf(stream, "  %s", option);
+    if (used < HELP_INDENT)
+        fprintf(stream, "%*s", HELP_INDENT - used, "");
+    else
+        fprintf(stream, "\n%*s", HELP_INDENT, "");
+    print_wrapped(meaning, stream);
+}
+
 void cli_number_help(const cli_number *number, const void *structure, FILE *stream) {
-    char text[256];
-    fprintf(stream, "  --%s %c%*s", number->name, number->kind == CLI_COUNT ? 'N' : 'X',
-            HELP_INDENT - 6 - (int)strlen(number->name), "");
-    snprintf(text, sizeof text, "%s (default %.9g%s%s)", number->help,
-             cli_number_value(number, structure), number->unit[0] ? " " : "", number->unit);
-    print_wrapped(text, stream);
+    char option[64], text[512];
+    snprintf(option, sizeof option, "--%s %c", number->name, number->kind == CLI_COUNT ? 'N' : 'X');
+    if (structure)
+        snprintf(text, sizeof text, "%s (default %.9g%s%s)", number->help,
+                 cli_number_value(number, structure), number->unit[0] ? " " : "", number->unit);
+    else
+        snprintf(text, sizeof text, "%s", number->help);
+    cli_option_help(option, text, stream);
 }
 
 void cli_number_options(const cli_number *numbers, size_t count, int first,

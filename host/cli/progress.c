@@ -16,11 +16,13 @@ static struct {
     double pace;       /* smoothed seconds per iteration, 0 before it is known */
     double at_seconds; /* where the pace was last measured */
     uint64_t at_iteration;
+    const char *label;
 } line;
 
-void cli_progress_start(bool quiet) {
+void cli_progress_start(bool quiet, const char *label) {
     const char *terminal = getenv("TERM");
     memset(&line, 0, sizeof line);
+    line.label = label;
     line.enabled =
         !quiet && isatty(STDERR_FILENO) && terminal && terminal[0] && strcmp(terminal, "dumb") != 0;
 }
@@ -72,20 +74,37 @@ static void append(char *text, size_t width, const char *part) {
     strcpy(text + used + gap, part);
 }
 
-/* The parts in the order of their importance, as many as the terminal is wide enough for. */
-static void compose(const ovoid_progress *progress, char *text, size_t width) {
+static void append_count(char *text, size_t width, uint64_t number, const char *what) {
     char part[96];
-    double share =
-        progress->iterations ? (double)progress->iteration / (double)progress->iterations : 0.0;
-    text[0] = '\0';
-    append(text, width, progress->stage);
+    snprintf(part, sizeof part, "%llu %s", (unsigned long long)number, what);
+    append(text, width, part);
+}
+
+/* Nobody knows how many steps there will be: what is done, and for how long it has gone on. */
+static void compose_endless(const ovoid_progress *progress, char *text, size_t width) {
+    char part[96];
+    if (progress->iteration > 0) {
+        snprintf(part, sizeof part, "step %llu", (unsigned long long)progress->iteration);
+        append(text, width, part);
+    }
+    if (strcmp(progress->stage, "sample") == 0)
+        append_count(text, width, progress->points, "points");
+    else
+        append_count(text, width, progress->ellipsoids, "ellipsoids");
+    cli_print_duration(floor(progress->seconds), part, sizeof part);
+    append(text, width, part);
+}
+
+/* Towards a known number of iterations. */
+static void compose_bounded(const ovoid_progress *progress, char *text, size_t width) {
+    char part[96];
+    double share = (double)progress->iteration / (double)progress->iterations;
     if (progress->iteration == 0)
         return;
     snprintf(part, sizeof part, "%llu/%llu", (unsigned long long)progress->iteration,
              (unsigned long long)progress->iterations);
     append(text, width, part);
-    snprintf(part, sizeof part, "%llu ellipsoids", (unsigned long long)progress->ellipsoids);
-    append(text, width, part);
+    append_count(text, width, progress->ellipsoids, "ellipsoids");
     snprintf(part, sizeof part, "error %.3f", progress->max_error);
     append(text, width, part);
     if (line.pace > 0.0) {
@@ -99,6 +118,18 @@ static void compose(const ovoid_progress *progress, char *text, size_t width) {
     snprintf(part, sizeof part, "[%.*s%.*s]", filled, "####################", BAR - filled,
              "....................");
     append(text, width, part);
+}
+
+/* The parts in the order of their importance, as many as the terminal is wide enough for. */
+static void compose(const ovoid_progress *progress, char *text, size_t width) {
+    text[0] = '\0';
+    if (line.label)
+        append(text, width, line.label);
+    append(text, width, progress->stage);
+    if (progress->iterations == 0)
+        compose_endless(progress, text, width);
+    else
+        compose_bounded(progress, text, width);
 }
 
 void cli_progress_show(const ovoid_progress *progress) {

@@ -52,16 +52,71 @@ static void add_molecule(builder *b, const fit_job *job) {
     add_number(b, "zero_radius_atoms", (double)counts.zero_radius);
 }
 
-static void add_result(builder *b, const fit_job *job) {
-    const ovoid_fit_result *result = &job->result;
-    add_string(b, "output", job->output);
+/* A finite number or null. */
+static void add_finite(builder *b, const char *key, double value) {
+    if (isfinite(value))
+        add_number(b, key, value);
+    else
+        b->good = b->good && cJSON_AddNullToObject(b->object, key);
+}
+
+/* Of the method that was used, and no other. */
+static void add_options(builder *b, const ovoid_fit_options *from) {
+    builder options = add_object(b, "options");
+    if (from->method == OVOID_METHOD_L1) {
+        add_numbers(&options, fit_l1_numbers, fit_l1_count, from);
+        add_string(&options, "kernel", fit_kernel_name(from->l1.kernel));
+        add_string(&options, "first_step", fit_first_step_name(from->l1.first_step));
+    } else {
+        add_numbers(&options, fit_adaptive_numbers, fit_adaptive_count, from);
+    }
+    b->good = options.good;
+}
+
+static void add_goal(builder *b, const fit_job *job) {
+    const ovoid_fit_result *result = &job->levels[0].result;
+    const cli_number *number = &fit_goal_numbers[job->options.adaptive.goal];
+    builder goal = add_object(b, "goal");
+    add_string(&goal, "name", number->name);
+    add_number(&goal, "asked", cli_number_value(number, &job->options));
+    goal.good = goal.good && cJSON_AddBoolToObject(goal.object, "reached", result->reached);
+    add_finite(&goal, "distance", result->distance);
+    b->good = goal.good;
+}
+
+/* What became of one model. */
+static void add_result(builder *b, const fit_job *job, const fit_level *level) {
+    const ovoid_fit_result *result = &level->result;
+    const bool l1 = job->options.method == OVOID_METHOD_L1;
+    add_string(b, "output", level->path);
     add_number(b, "ellipsoids", (double)result->ellipsoids);
     add_number(b, "sparse_ratio",
                (double)result->ellipsoids / (double)ovoid_molecule_atoms(job->molecule));
     add_number(b, "points", (double)result->points);
-    add_number(b, "rms_error", result->rms_error);
-    add_number(b, "max_error", result->max_error);
+    if (l1) {
+        add_number(b, "rms_error", result->rms_error);
+        add_number(b, "max_error", result->max_error);
+    }
     add_number(b, "iterations", (double)result->iterations);
+    if (!l1)
+        add_number(b, "solver_iterations", (double)result->solver_iterations);
+    if (level->measured)
+        b->good = b->good && measures_report(b->object, &level->measures, &job->measuring);
+}
+
+static void add_levels(builder *b, const fit_job *job) {
+    cJSON *levels = b->good ? cJSON_AddArrayToObject(b->object, "levels") : NULL;
+    b->good = levels != NULL;
+    for (size_t i = 0; i < job->levels_done && b->good; i++) {
+        const fit_level *from = &job->levels[i];
+        builder level = {cJSON_CreateObject(), true};
+        level.good = level.object && cJSON_AddItemToArray(levels, level.object);
+        add_number(&level, "level", (double)(i + 1));
+        add_result(&level, job, from);
+        add_finite(&level, "distance", from->result.distance);
+        add_seconds(&level, "seconds", from->result.sample_seconds + from->result.fit_seconds);
+        b->good = level.good;
+    }
 }
 
 static void add_device(builder *b, const ovoid_device_info *device) {
@@ -79,21 +134,27 @@ static void add_times(builder *b, const fit_job *job) {
     builder seconds = add_object(b, "seconds");
     add_seconds(&seconds, "device", job->device_seconds);
     add_seconds(&seconds, "read", job->read_seconds);
-    add_seconds(&seconds, "sample", job->result.sample_seconds);
-    add_seconds(&seconds, "fit", job->result.fit_seconds);
+    add_seconds(&seconds, "sample", fit_sample_seconds(job));
+    add_seconds(&seconds, "fit", fit_fit_seconds(job));
     add_seconds(&seconds, "measure", job->measure_seconds);
     add_seconds(&seconds, "write", job->write_seconds);
     add_seconds(&seconds, "total", job->total_seconds);
     b->good = seconds.good;
-    const ovoid_fit_profile *spent = &job->result.profile;
+}
+
+/* Of the first level. Methods that do not wait for each part of their work measure none. */
+static void add_profile(builder *b, const fit_job *job) {
+    const ovoid_fit_profile *spent = &job->levels[0].result.profile;
     builder profile = add_object(b, "profile");
-    add_seconds(&profile, "lists_seconds", spent->lists_seconds);
-    add_seconds(&profile, "field_seconds", spent->field_seconds);
-    add_seconds(&profile, "moments_seconds", spent->moments_seconds);
-    add_seconds(&profile, "host_seconds", spent->host_seconds);
-    add_number(&profile, "list_builds", (double)spent->list_builds);
-    add_number(&profile, "field_passes", (double)spent->field_passes);
-    add_number(&profile, "moments_passes", (double)spent->moments_passes);
+    if (spent->field_passes > 0) {
+        add_seconds(&profile, "lists_seconds", spent->lists_seconds);
+        add_seconds(&profile, "field_seconds", spent->field_seconds);
+        add_seconds(&profile, "moments_seconds", spent->moments_seconds);
+        add_seconds(&profile, "host_seconds", spent->host_seconds);
+        add_number(&profile, "list_builds", (double)spent->list_builds);
+        add_number(&profile, "field_passes", (double)spent->field_passes);
+        add_number(&profile, "moments_passes", (double)spent->moments_passes);
+    }
     add_number(&profile, "launches", (double)spent->launches);
     b->good = profile.good;
 }
@@ -104,17 +165,19 @@ ovoid_status fit_report_write(const fit_job *job) {
     add_string(&b, "version", ovoid_version());
     add_molecule(&b, job);
     add_string(&b, "method", fit_method_name(job->options.method));
-    add_numbers(&b, fit_surface_numbers, fit_surface_count, &job->options);
-    builder options = add_object(&b, "options");
-    add_numbers(&options, fit_l1_numbers, fit_l1_count, &job->options);
-    add_string(&options, "kernel", fit_kernel_name(job->options.l1.kernel));
-    add_string(&options, "first_step", fit_first_step_name(job->options.l1.first_step));
-    b.good = options.good;
-    add_result(&b, job);
-    if (job->measured)
-        b.good = b.good && measures_report(b.object, &job->measures, &job->measuring);
+    ovoid_fit_options used = job->options;
+    used.spacing = job->levels[0].result.spacing; /* the default depends on the molecule */
+    add_numbers(&b, fit_surface_numbers, fit_surface_count, &used);
+    add_options(&b, &job->options);
+    if (job->options.method == OVOID_METHOD_ADAPTIVE)
+        add_goal(&b, job);
+    add_result(&b, job, &job->levels[0]);
+    if (job->level_count > 1)
+        add_levels(&b, job);
     add_device(&b, ovoid_context_device(job->context));
     add_times(&b, job);
+    add_profile(&b, job);
+    b.good = b.good && cli_profile_report(&job->profile, b.object);
     ovoid_status status =
         b.good ? cli_json_write(job->context, b.object, job->report) : OVOID_ERROR_MEMORY;
     cJSON_Delete(b.object);

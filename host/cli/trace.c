@@ -11,10 +11,15 @@ static void give_up(fit_trace *trace) {
     fit_trace_destroy(trace);
 }
 
-ovoid_status fit_trace_open(fit_trace *trace, ovoid_context *context, const char *path) {
-    static const char header[] = "iteration,E_s,E_l1,w_s,w_l,objective,max_error,ellipsoids,step,"
-                                 "seconds,stage\n";
-    *trace = (fit_trace){.context = context};
+/* The methods have their own columns. */
+static const char l1_header[] = "iteration,E_s,E_l1,w_s,w_l,objective,max_error,ellipsoids,step,"
+                                "seconds,stage\n";
+static const char adaptive_header[] = "level,step,ellipsoids,points,objective,seconds,stage\n";
+
+ovoid_status fit_trace_open(fit_trace *trace, ovoid_context *context, const char *path,
+                            ovoid_method method) {
+    const char *header = method == OVOID_METHOD_L1 ? l1_header : adaptive_header;
+    *trace = (fit_trace){.context = context, .method = method};
     ovoid_status status = ovoid_file_create(context, path, &trace->file);
     if (status != OVOID_OK)
         return status;
@@ -24,14 +29,27 @@ ovoid_status fit_trace_open(fit_trace *trace, ovoid_context *context, const char
     return OVOID_OK;
 }
 
+void fit_trace_level(fit_trace *trace, size_t level) {
+    trace->level = level;
+    trace->iteration = 0;
+}
+
 void fit_trace_add(fit_trace *trace, const ovoid_progress *p) {
     char row[ROW_BYTES];
-    if (!trace->file || p->iteration == 0)
+    int length;
+    /* What is reported between iterations, such as a piece that was sampled, is none. */
+    if (!trace->file || p->iteration <= trace->iteration)
         return;
-    int length = snprintf(row, sizeof row, "%llu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%llu,%.9g,%.6f,%s\n",
+    trace->iteration = p->iteration;
+    if (trace->method == OVOID_METHOD_L1)
+        length = snprintf(row, sizeof row, "%llu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%llu,%.9g,%.6f,%s\n",
                           (unsigned long long)p->iteration, p->accuracy_term, p->sparse_term,
                           p->accuracy_weight, p->sparse_weight, p->objective, p->max_error,
                           (unsigned long long)p->ellipsoids, p->step, p->seconds, p->stage);
+    else
+        length = snprintf(row, sizeof row, "%zu,%llu,%llu,%llu,%.9g,%.6f,%s\n", trace->level + 1,
+                          (unsigned long long)p->iteration, (unsigned long long)p->ellipsoids,
+                          (unsigned long long)p->points, p->objective, p->seconds, p->stage);
     if (ovoid_file_write(trace->context, trace->file, row, (size_t)length) != OVOID_OK)
         give_up(trace);
 }

@@ -38,6 +38,7 @@ typedef struct ov_device {
     uint32_t built;              /* programs compiled from source so far */
     uint32_t loaded;             /* programs taken from the cache so far */
     bool cache_told;             /* the user knows that the cache does not work */
+    struct ov_profile *profile;  /* times of kernels; NULL until ovoid_context_profile() */
 } ov_device;
 
 /* The context's device, opening the default one if none is open yet. */

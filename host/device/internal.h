@@ -67,6 +67,29 @@ bool ov_private_folder(const char *base, char *path, size_t size);
 /* Creates a folder and those above it, mode 0700 each. False with errno when that fails. */
 bool ov_make_folders(const char *path);
 
+/* ---- profile ------------------------------------------------------------------------------ */
+
+/* What ovoid_context_profile() asks for. Each launch leaves an event; events are read where the
+ * host waits for the device anyway, and at the latest when so many have come together. */
+#define OV_PROFILE_PENDING 4096
+typedef struct ov_profile ov_profile;
+
+/* Counts the device's launches from now on, beginning with none. A driver without times leaves the
+ * counts. */
+ovoid_status ov_profile_start(ovoid_context *context, ov_device *device);
+
+/* Before a launch: makes room for it, and says whether it is to leave an event. Nothing to do, and
+ * no event, where launches are not counted. */
+ovoid_status ov_profile_prepare(ovoid_context *context, ov_device *device, bool *timed);
+
+/* After it: takes over the event, NULL for none. `name` is a string constant. */
+void ov_profile_add(ov_device *device, const char *name, cl_event event);
+
+/* Waits for the launches and adds up their times. */
+ovoid_status ov_profile_drain(ovoid_context *context, ov_device *device);
+
+void ov_profile_release(ov_device *device);
+
 /* ---- programs ----------------------------------------------------------------------------- */
 
 typedef struct ov_source {

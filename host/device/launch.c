@@ -44,11 +44,16 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     }
     if (local)
         global = (global + local - 1) / local * local;
+    bool timed;
+    if ((status = ov_profile_prepare(context, context->device, &timed)) != OVOID_OK)
+        return status;
+    cl_event event = NULL;
     cl_int code = clEnqueueNDRangeKernel(context->device->queue, kernel->handle, 1, NULL, &global,
-                                         local ? &local : NULL, 0, NULL, NULL);
+                                         local ? &local : NULL, 0, NULL, timed ? &event : NULL);
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueNDRangeKernel", kernel->name);
     context->device->launches++;
+    ov_profile_add(context->device, kernel->name, event);
     return OVOID_OK;
 }
 
@@ -56,7 +61,8 @@ ovoid_status ov_finish(ovoid_context *context) {
     if (!context->device)
         return OVOID_OK;
     cl_int code = clFinish(context->device->queue);
-    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clFinish", NULL);
+    return code == CL_SUCCESS ? ov_profile_drain(context, context->device)
+                              : ov_cl_fail(context, code, "clFinish", NULL);
 }
 
 /* ---- buffers ------------------------------------------------------------------------------ */
@@ -131,7 +137,8 @@ ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t o
         return status;
     cl_int code = clEnqueueWriteBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
                                        bytes, data, 0, NULL, NULL);
-    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
+    return code == CL_SUCCESS ? ov_profile_drain(context, context->device)
+                              : ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
 }
 
 ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, size_t offset,
@@ -143,5 +150,6 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
         return status;
     cl_int code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
                                       bytes, data, 0, NULL, NULL);
-    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+    return code == CL_SUCCESS ? ov_profile_drain(context, context->device)
+                              : ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
 }

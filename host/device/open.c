@@ -213,6 +213,7 @@ static void release(ov_device *device) {
     ov_programs_release(device);
     if (device->queue) {
         clFinish(device->queue);
+        ov_profile_release(device);
         clReleaseCommandQueue(device->queue);
     }
     if (device->context)
@@ -256,6 +257,8 @@ static ovoid_status make_device(ovoid_context *context, const ov_device_entry *e
         goto cleanup;
     }
     OV_TRY(set_shape(context, device));
+    if (context->profile)
+        OV_TRY(ov_profile_start(context, device));
     *made = device;
     device = NULL;
 cleanup:

@@ -64,6 +64,10 @@ typedef struct ov_terms {
  * positive definite. */
 ovoid_status ov_terms_set(ovoid_context *context, ov_terms *terms, const ov_quadric *quadrics,
                           size_t count, const double origin[3], double cutoff);
+/* As ov_terms_set(), with the skin of each term in lists (angstrom; NULL: 0). */
+ovoid_status ov_terms_set_skins(ovoid_context *context, ov_terms *terms, const ov_quadric *quadrics,
+                                const float *skins, size_t count, const double origin[3],
+                                double cutoff);
 void ov_terms_destroy(ov_terms *terms);
 
 /* ---- lists -------------------------------------------------------------------------------- */
@@ -78,10 +82,15 @@ typedef struct ov_lists {
     ov_buffer count;      /* scratch */
     uint32_t *scan;       /* scratch */
     size_t scan_capacity;
-    ov_kernel packs_of_terms, count_transposed, fill_transposed, sort_lists;
+    size_t room_terms; /* terms that room is laid out for, 0: none */
+    uint32_t *room; /* room_terms + 1: where each term's packs may go, a little more than it had */
+    size_t room_capacity;
+    ov_buffer room_start, room_item;
+    ov_kernel packs_of_terms, close_gaps, count_transposed, fill_transposed, sort_lists;
 } ov_lists;
 
-/* Pairs terms with the packs that they reach, boxes grown by skin (angstrom). OVOID_ERROR_LIMIT
+/* Pairs terms with the packs that they reach, boxes grown by skin and the
+ * term's own (angstrom). OVOID_ERROR_LIMIT
  * when there are more pairs than 2^32 - 1 or than a buffer of the device holds. */
 ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
                             const ov_terms *terms, double skin);
@@ -90,7 +99,7 @@ void ov_lists_destroy(ov_lists *lists);
 /* ---- operations --------------------------------------------------------------------------- */
 
 typedef struct ov_operations {
-    ov_kernel field, field_polynomial, field_gradient, moments, residual;
+    ov_kernel field, field_polynomial, field_gradient, moments, gram, residual;
 } ov_operations;
 
 /* Work-group for kernels whose work-items do not share anything: one item on CPUs, where a driver
@@ -104,12 +113,12 @@ void ov_operations_destroy(ov_operations *operations);
 ovoid_status ov_field(ovoid_context *context, ov_operations *operations, const ov_points *points,
                       const ov_terms *terms, const ov_lists *lists, ov_buffer *value);
 
-/* value[k] = sum_i e_i(y_k) p_i(y_k - mu_i); polynomial: OV_MONOMIALS floats per term, on the
- * device. */
+/* value[k] = weight[k] sum_i e_i(y_k) p_i(y_k - mu_i). polynomial: OV_MONOMIALS floats per term, on
+ * the device; weight: packs * OV_PACK floats, NULL for 1 everywhere; value is neither of them. */
 ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operations,
                                  const ov_points *points, const ov_terms *terms,
                                  const ov_lists *lists, const ov_buffer *polynomial,
-                                 ov_buffer *value);
+                                 const ov_buffer *weight, ov_buffer *value);
 
 /* As ov_field(), with the gradient: OV_PACK x, y, z components per pack (angstrom^-1). */
 ovoid_status ov_field_gradient(ovoid_context *context, ov_operations *operations,
@@ -120,6 +129,13 @@ ovoid_status ov_field_gradient(ovoid_context *context, ov_operations *operations
 ovoid_status ov_moments(ovoid_context *context, ov_operations *operations, const ov_points *points,
                         const ov_terms *terms, const ov_lists *lists, const ov_buffer *u,
                         ov_buffer *result);
+
+/* result: OV_GRAM floats per term, sum_k w_k e_i(y_k)^2 z^alpha, z = y_k - mu_i, for the monomials
+ * of shared.h; w: packs * OV_PACK floats, 0 at the fill. Infinite where a sum exceeds a float's
+ * range. */
+ovoid_status ov_gram(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                     const ov_terms *terms, const ov_lists *lists, const ov_buffer *w,
+                     ov_buffer *result);
 
 /* u = value - target at the points, 0 at the fill; sums: per pack sum of u^2 and largest |u|. */
 ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, const ov_points *points,
@@ -142,9 +158,15 @@ typedef struct ov_lattice {
 ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_t atoms,
                                double spacing, double padding, ov_lattice *lattice);
 
-/* Which lattice points are kept: phi within [low, high]. */
+/* Which lattice points are kept: phi within [low, high]; of those above, as guards of the inside,
+ * the ones whose three lattice indices, counted from 0, are multiples of inside_every (0: none); of
+ * those from outside_low to low, as guards of the outside, the multiples of outside_every (0:
+ * none). */
 typedef struct ov_band {
     double low, high;
+    uint32_t inside_every;
+    double outside_low;
+    uint32_t outside_every;
 } ov_band;
 
 /* The constrained points with phi and its gradient, on the device. */

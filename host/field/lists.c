@@ -3,10 +3,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Room beyond what a term had: a share of it, and at least so many packs. */
+#define ROOM_SHARE 3
+#define ROOM_LEAST 8
+
 static ovoid_status prepare(ovoid_context *context, ov_lists *lists) {
     ovoid_status status = OVOID_OK;
     if (lists->packs_of_terms.handle)
         return OVOID_OK;
+    OV_TRY(ov_kernel_create(context, "lists", "close_gaps", &lists->close_gaps));
     OV_TRY(ov_kernel_create(context, "lists", "count_transposed", &lists->count_transposed));
     OV_TRY(ov_kernel_create(context, "lists", "fill_transposed", &lists->fill_transposed));
     OV_TRY(ov_kernel_create(context, "lists", "sort_lists", &lists->sort_lists));
@@ -45,28 +50,78 @@ cleanup:
     return status;
 }
 
+/* See kernels/lists.cl. */
+enum { COUNT, FILL, FILL_COUNT };
+
+static ovoid_status find_packs(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                               const ov_terms *terms, double skin, size_t group, cl_uint mode,
+                               const ov_buffer *start, const ov_buffer *item) {
+    const cl_uint count = (cl_uint)terms->count;
+    const cl_float grow = (cl_float)skin;
+    return OV_LAUNCH(context, &lists->packs_of_terms, terms->count, group, OV_ARG(count),
+                     OV_ARG(terms->device.memory), OV_ARG(points->tree),
+                     OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(mode),
+                     OV_ARG(lists->count.memory), OV_ARG(start->memory), OV_ARG(item->memory));
+}
+
+/* Terms that are listed again have moved a little: with some room for each of them one walk finds
+ * their packs, where count and fill take two. */
+static ovoid_status lay_room(ovoid_context *context, ov_lists *lists, size_t terms) {
+    ovoid_status status = OVOID_OK;
+    lists->room_terms = 0;
+    OV_TRY(ov_grow(context, &lists->room, &lists->room_capacity, terms + 1, sizeof *lists->room,
+                   "lists"));
+    uint64_t sum = 0;
+    for (size_t i = 0; i < terms; ++i) {
+        const uint32_t had = lists->scan[i + 1] - lists->scan[i];
+        lists->room[i] = (uint32_t)sum;
+        sum += had + had / ROOM_SHARE + ROOM_LEAST;
+        if (sum > UINT32_MAX)
+            return OVOID_OK; /* two walks, then */
+    }
+    lists->room[terms] = (uint32_t)sum;
+    OV_TRY(ov_buffer_reserve(context, &lists->room_start, (terms + 1) * sizeof *lists->room,
+                             "starts of lists"));
+    OV_TRY(ov_buffer_write(context, &lists->room_start, 0, lists->room,
+                           (terms + 1) * sizeof *lists->room));
+    OV_TRY(ov_buffer_reserve(context, &lists->room_item, sum * sizeof(cl_uint),
+                             "packs of ellipsoids"));
+    lists->room_terms = terms;
+cleanup:
+    return status;
+}
+
+static bool room_sufficed(const ov_lists *lists) {
+    for (size_t i = 0; i < lists->room_terms; ++i)
+        if (lists->scan[i + 1] - lists->scan[i] > lists->room[i + 1] - lists->room[i])
+            return false;
+    return true;
+}
+
 static ovoid_status list_packs(ovoid_context *context, ov_lists *lists, const ov_points *points,
                                const ov_terms *terms, double skin, size_t group) {
     ovoid_status status = OVOID_OK;
     const cl_uint count = (cl_uint)terms->count;
-    const cl_float grow = (cl_float)skin;
-    const size_t bytes =
-        (terms->count > points->packs ? terms->count : points->packs) * sizeof(cl_uint);
-    OV_TRY(ov_buffer_reserve(context, &lists->count, bytes, "counts of lists"));
-    OV_TRY(ov_buffer_reserve(context, &lists->term_start, bytes, "starts of lists"));
+    const size_t most = terms->count > points->packs ? terms->count : points->packs;
+    const bool again = lists->room_terms == terms->count && terms->count > 0;
+    OV_TRY(ov_buffer_reserve(context, &lists->count, most * sizeof(cl_uint), "counts of lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->term_start, (most + 1) * sizeof(cl_uint),
+                             "starts of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->term_item, sizeof(cl_uint), "packs of ellipsoids"));
-    for (cl_uint fill = 0; fill <= 1; ++fill) {
-        OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, terms->count, group, OV_ARG(count),
-                         OV_ARG(terms->device.memory), OV_ARG(points->tree),
-                         OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(fill),
-                         OV_ARG(lists->count.memory), OV_ARG(lists->term_start.memory),
-                         OV_ARG(lists->term_item.memory)));
-        if (fill == 0) {
-            OV_TRY(scan_counts(context, lists, terms->count, &lists->term_start, &lists->items));
-            OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * sizeof(cl_uint),
-                                     "packs of ellipsoids"));
-        }
-    }
+    OV_TRY(again ? find_packs(context, lists, points, terms, skin, group, FILL_COUNT,
+                              &lists->room_start, &lists->room_item)
+                 : find_packs(context, lists, points, terms, skin, group, COUNT, &lists->term_start,
+                              &lists->term_item));
+    OV_TRY(scan_counts(context, lists, terms->count, &lists->term_start, &lists->items));
+    OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * sizeof(cl_uint),
+                             "packs of ellipsoids"));
+    if (again && room_sufficed(lists))
+        return OV_LAUNCH(context, &lists->close_gaps, terms->count, group, OV_ARG(count),
+                         OV_ARG(lists->room_start.memory), OV_ARG(lists->room_item.memory),
+                         OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory));
+    OV_TRY(find_packs(context, lists, points, terms, skin, group, FILL, &lists->term_start,
+                      &lists->term_item));
+    OV_TRY(lay_room(context, lists, terms->count));
 cleanup:
     return status;
 }
@@ -112,13 +167,16 @@ cleanup:
 
 void ov_lists_destroy(ov_lists *lists) {
     ov_buffer *const buffers[] = {&lists->term_start, &lists->term_item, &lists->pack_start,
-                                  &lists->pack_item, &lists->count};
+                                  &lists->pack_item,  &lists->count,     &lists->room_start,
+                                  &lists->room_item};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     ov_kernel_destroy(&lists->packs_of_terms);
     ov_kernel_destroy(&lists->count_transposed);
     ov_kernel_destroy(&lists->fill_transposed);
     ov_kernel_destroy(&lists->sort_lists);
+    ov_kernel_destroy(&lists->close_gaps);
     free(lists->scan);
+    free(lists->room);
     memset(lists, 0, sizeof *lists);
 }

@@ -12,6 +12,7 @@ void ov_operations_destroy(ov_operations *operations) {
     ov_kernel_destroy(&operations->field_polynomial);
     ov_kernel_destroy(&operations->field_gradient);
     ov_kernel_destroy(&operations->moments);
+    ov_kernel_destroy(&operations->gram);
     ov_kernel_destroy(&operations->residual);
 }
 
@@ -73,8 +74,9 @@ cleanup:
 ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operations,
                                  const ov_points *points, const ov_terms *terms,
                                  const ov_lists *lists, const ov_buffer *polynomial,
-                                 ov_buffer *value) {
+                                 const ov_buffer *weight, ov_buffer *value) {
     ovoid_status status = OVOID_OK;
+    const cl_mem weights = weight ? weight->memory : NULL; /* null in the kernel, too */
     const cl_uint packs = (cl_uint)points->packs;
     OV_TRY(make(context, &operations->field_polynomial, "field", "field_polynomial"));
     OV_TRY(reserve_values(context, points, value));
@@ -82,7 +84,7 @@ ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operatio
                         ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
                              OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
                              OV_ARG(terms->device.memory), OV_ARG(polynomial->memory),
-                             OV_ARG(value->memory))));
+                             OV_ARG(weights), OV_ARG(value->memory))));
 cleanup:
     return status;
 }
@@ -115,6 +117,22 @@ ovoid_status ov_moments(ovoid_context *context, ov_operations *operations, const
                              "moments"));
     OV_TRY(launch_terms(context, &operations->moments, terms->count,
                         ARGS(OV_ARG(count), OV_ARG(points->xyz.memory), OV_ARG(u->memory),
+                             OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
+                             OV_ARG(terms->device.memory), OV_ARG(result->memory))));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_gram(ovoid_context *context, ov_operations *operations, const ov_points *points,
+                     const ov_terms *terms, const ov_lists *lists, const ov_buffer *w,
+                     ov_buffer *result) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint count = (cl_uint)terms->count;
+    OV_TRY(make(context, &operations->gram, "gram", "gram"));
+    OV_TRY(ov_buffer_reserve(context, result, terms->count * OV_GRAM * sizeof(cl_float),
+                             "sums of products"));
+    OV_TRY(launch_terms(context, &operations->gram, terms->count,
+                        ARGS(OV_ARG(count), OV_ARG(points->xyz.memory), OV_ARG(w->memory),
                              OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
                              OV_ARG(terms->device.memory), OV_ARG(result->memory))));
 cleanup:

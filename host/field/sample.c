@@ -198,31 +198,49 @@ static ovoid_status check_room(ovoid_context *context, const sampler *s, uint64_
                    (unsigned long long)points, (unsigned long long)s->kept_limit);
 }
 
-/* Points on the lattice within the piece of this number. */
-static uint64_t points_in_piece(const sampler *s, uint64_t piece) {
+/* Points on the lattice within the piece of this number, those whose indices are multiples of
+ * step. */
+static uint64_t points_in_piece(const sampler *s, uint64_t piece, uint64_t step) {
     uint64_t points = 1;
     for (int axis = 0; axis < 3; ++axis) {
         const uint64_t first = piece % s->pieces.count[axis] * s->pieces.size[axis];
         const uint64_t left = s->lattice->size[axis] - first;
-        points *= left < s->pieces.size[axis] ? left : s->pieces.size[axis];
+        const uint64_t end = first + (left < s->pieces.size[axis] ? left : s->pieces.size[axis]);
+        points *= (end + step - 1) / step - (first + step - 1) / step;
         piece /= s->pieces.count[axis];
     }
     return points;
 }
 
-/* Pieces without atoms are kept whole or not at all, which bounds the count before any is
- * evaluated. */
+/* Least phi of the points that are kept. */
+static double lowest(ov_band band) {
+    return band.outside_every ? fmin(band.outside_low, band.low) : band.low;
+}
+
+/* What pieces without atoms hold is known, which bounds the count before any is evaluated: all of
+ * their points, the outside's guards, or none. */
 static ovoid_status check_empty_pieces(ovoid_context *context, const sampler *s) {
     uint64_t points = 0;
-    if (s->band.low > 0.0)
+    const uint64_t step = s->band.low <= 0.0 ? 1 : s->band.outside_every;
+    if (lowest(s->band) > 0.0)
         return OVOID_OK;
     for (uint64_t p = 0; p < s->pieces.total; ++p)
         if (s->pieces.start[p] == s->pieces.start[p + 1])
-            points += points_in_piece(s, p);
+            points += points_in_piece(s, p, step);
     return check_room(context, s, points);
 }
 
-/* Appends the piece's points that lie on the lattice and in the band. */
+static bool every(uint32_t step, const uint64_t index[3]) {
+    return step > 0 && index[0] % step == 0 && index[1] % step == 0 && index[2] % step == 0;
+}
+
+static bool is_kept(ov_band band, float value, const uint64_t index[3]) {
+    if (value > band.high)
+        return every(band.inside_every, index);
+    return value >= band.low || (value >= band.outside_low && every(band.outside_every, index));
+}
+
+/* Appends the piece's points that lie on the lattice and are kept. */
 static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t at[3]) {
     const uint64_t *const size = s->pieces.size;
     const uint64_t row = size[0] / OV_BRICK_X, rows = size[1] / OV_BRICK_Y;
@@ -232,7 +250,7 @@ static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t
     if (status != OVOID_OK)
         return status;
     for (size_t k = 0; k < s->points.count; ++k) {
-        if (!(s->values[k] >= s->band.low && s->values[k] <= s->band.high))
+        if (!(s->values[k] >= lowest(s->band)))
             continue;
         const uint64_t pack = s->order[k / OV_PACK];
         uint64_t within[3];
@@ -243,7 +261,7 @@ static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t
             at[2] + pack / (row * rows) * OV_BRICK_Z + within[2],
         };
         if (index[0] >= s->lattice->size[0] || index[1] >= s->lattice->size[1] ||
-            index[2] >= s->lattice->size[2])
+            index[2] >= s->lattice->size[2] || !is_kept(s->band, s->values[k], index))
             continue;
         for (size_t axis = 0; axis < 3; ++axis)
             s->kept[3 * s->kept_count + axis] =
@@ -267,7 +285,7 @@ static ovoid_status sample_pieces(ovoid_context *context, sampler *s) {
             for (uint64_t x = 0; x < s->pieces.count[0]; ++x, ++piece) {
                 const uint64_t at[3] = {x * s->pieces.size[0], y * s->pieces.size[1],
                                         z * s->pieces.size[2]};
-                if (s->pieces.start[piece] == s->pieces.start[piece + 1] && s->band.low > 0.0)
+                if (s->pieces.start[piece] == s->pieces.start[piece + 1] && lowest(s->band) > 0.0)
                     continue; /* far outside, and the band has no such points */
                 OV_TRY(evaluate_piece(context, s, piece, at));
                 OV_TRY(keep_band(context, s, at));

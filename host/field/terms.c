@@ -59,6 +59,12 @@ static bool to_term(const ov_quadric *quadric, const double origin[3], double lo
 
 ovoid_status ov_terms_set(ovoid_context *context, ov_terms *terms, const ov_quadric *quadrics,
                           size_t count, const double origin[3], double cutoff) {
+    return ov_terms_set_skins(context, terms, quadrics, NULL, count, origin, cutoff);
+}
+
+ovoid_status ov_terms_set_skins(ovoid_context *context, ov_terms *terms, const ov_quadric *quadrics,
+                                const float *skins, size_t count, const double origin[3],
+                                double cutoff) {
     ovoid_status status =
         ov_grow(context, &terms->host, &terms->capacity, count, sizeof *terms->host, "terms");
     if (status != OVOID_OK)
@@ -72,6 +78,8 @@ ovoid_status ov_terms_set(ovoid_context *context, ov_terms *terms, const ov_quad
                            i + 1, quadrics[i].amplitude, quadrics[i].centre[0],
                            quadrics[i].centre[1], quadrics[i].centre[2], quadrics[i].a[0],
                            quadrics[i].a[3], quadrics[i].a[5]);
+    for (size_t i = 0; skins && i < count; ++i)
+        terms->host[i].skin = skins[i];
     terms->count = count;
     OV_TRY(ov_buffer_reserve(context, &terms->device, count * sizeof *terms->host, "terms"));
     OV_TRY(ov_buffer_write(context, &terms->device, 0, terms->host, count * sizeof *terms->host));

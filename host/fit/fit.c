@@ -1,6 +1,8 @@
+#include "fit/adaptive.h"
 #include "fit/l1.h"
 #include "fit/options.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 typedef struct sampling_report {
@@ -30,32 +32,50 @@ static ovoid_status sample_band(ovoid_context *context, const ovoid_molecule *mo
     sampling_report report = {.options = options, .atoms = atoms, .began = began};
     const ov_sampling sampling = {.go_on = report_sampling, .user = &report};
     ov_lattice lattice;
+    const double spacing = options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1;
     const ovoid_status status =
-        ov_lattice_create(context, xyzr, atoms, options->spacing, options->padding, &lattice);
+        ov_lattice_create(context, xyzr, atoms, spacing, options->padding, &lattice);
     return status != OVOID_OK
                ? status
                : ov_sample(context, xyzr, atoms, options->decay, &lattice, band, sampling, samples);
+}
+
+static ovoid_status fit_l1(ovoid_context *context, const ovoid_molecule *molecule,
+                           const ovoid_fit_options *options, double began,
+                           ovoid_ellipsoid **ellipsoids, ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    ov_samples samples = {0};
+    OV_TRY(sample_band(context, molecule, options, began, &samples));
+    result->sample_seconds = ov_seconds() - began;
+    result->spacing = options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1;
+    result->reached = true;
+    result->distance = NAN;
+    OV_TRY(ov_l1_fit(context, ovoid_molecule_xyzr(molecule), ovoid_molecule_atoms(molecule),
+                     &samples, options, began, ellipsoids, result));
+cleanup:
+    ov_samples_destroy(&samples);
+    return status;
 }
 
 ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
                        const ovoid_fit_options *options, ovoid_model **model,
                        ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
-    ov_samples samples = {0};
     ovoid_ellipsoid *ellipsoids = NULL;
     ovoid_fit_result done = {0};
     ov_device *device;
     if (!context || !molecule || !options || !model)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_fit: an argument is NULL");
     const size_t atoms = ovoid_molecule_atoms(molecule);
+    const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const double began = ov_seconds();
     OV_TRY(ov_fit_options_check(context, options));
-    OV_TRY(ov_atoms_check(context, ovoid_molecule_xyzr(molecule), atoms, options->decay));
+    OV_TRY(ov_atoms_check(context, xyzr, atoms, options->decay));
     OV_TRY(ov_device_get(context, &device));
-    OV_TRY(sample_band(context, molecule, options, began, &samples));
-    done.sample_seconds = ov_seconds() - began;
-    OV_TRY(ov_l1_fit(context, ovoid_molecule_xyzr(molecule), atoms, &samples, options, began,
-                     &ellipsoids, &done));
+    if (options->method == OVOID_METHOD_L1)
+        OV_TRY(fit_l1(context, molecule, options, began, &ellipsoids, &done));
+    else
+        OV_TRY(ov_adaptive_fit(context, xyzr, atoms, options, began, &ellipsoids, &done));
     OV_TRY(ovoid_model_create(context, ellipsoids, (size_t)done.ellipsoids, options->decay,
                               options->isovalue, model));
     done.fit_seconds = ov_seconds() - began - done.sample_seconds;
@@ -63,6 +83,5 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
         *result = done;
 cleanup:
     free(ellipsoids);
-    ov_samples_destroy(&samples);
     return status;
 }

@@ -97,6 +97,23 @@ static void add_point(ov_facets *facets, const double *xyz, uint32_t vertex) {
     facets->vertex[at] = vertex;
 }
 
+/* The vertices of the triangles where they come up first. */
+static ovoid_status list_vertices(ovoid_context *context, const ovoid_mesh *mesh,
+                                  const uint32_t *order, ov_facets *facets) {
+    bool *const listed = ov_alloc(context, mesh->vertices, sizeof *listed, "points of a mesh");
+    facets->xyz = ov_alloc(context, 3 * mesh->vertices, sizeof *facets->xyz, "points of a mesh");
+    facets->vertex = ov_alloc(context, mesh->vertices, sizeof *facets->vertex, "points of a mesh");
+    const bool good = listed && facets->xyz && facets->vertex;
+    for (size_t k = 0; good && k < 3 * facets->triangles; ++k) {
+        const uint32_t v = mesh->corners[3 * (size_t)order[k / 3] + k % 3];
+        if (!listed[v])
+            add_point(facets, mesh->xyz + 3 * (size_t)v, v);
+        listed[v] = true;
+    }
+    free(listed);
+    return good ? OVOID_OK : OVOID_ERROR_MEMORY;
+}
+
 /* Each triangle's centre, and its vertices where they come up first. */
 static ovoid_status list_points(ovoid_context *context, const ovoid_mesh *mesh,
                                 const uint32_t *order, ov_facets *facets) {
@@ -183,20 +200,20 @@ cleanup:
     return status;
 }
 
-static ovoid_status upload_triangles(ovoid_context *context, const ovoid_mesh *mesh,
-                                     const uint32_t *order, ov_facets *facets) {
+/* Packs the triangles piece by piece: all at once would take as much memory on the host as on the
+ * device. */
+#define PIECE_LEAVES ((size_t)4096)
+
+static ovoid_status upload_leaves(ovoid_context *context, const ovoid_mesh *mesh,
+                                  const uint32_t *order, ov_facets *facets, size_t leaves,
+                                  float *low_high) {
     ovoid_status status = OVOID_OK;
-    const size_t leaves = (facets->triangles + OV_LEAF - 1) / OV_LEAF;
-    const size_t leaf_floats = OV_TRIANGLE * OV_LEAF;
-    float *boxes = NULL;
-    size_t floats = 0;
-    float *const packed =
-        ov_alloc(context, leaves * leaf_floats, sizeof *packed, "triangles of a mesh");
-    float *const low_high = ov_alloc(context, leaves * BOX, sizeof *low_high, "boxes of triangles");
-    if (!packed || !low_high) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
+    const size_t leaf_floats = OV_TRIANGLE * OV_LEAF, bytes = leaf_floats * sizeof(float);
+    const size_t piece = leaves < PIECE_LEAVES ? leaves : PIECE_LEAVES;
+    float *const packed = ov_alloc(context, piece * leaf_floats, sizeof *packed, "triangles");
+    if (!packed)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_buffer_reserve(context, &facets->leaves, leaves * bytes, "triangles of a mesh"));
     for (size_t leaf = 0; leaf < leaves; ++leaf) {
         float *const box = low_high + leaf * BOX;
         for (size_t k = 0; k < BOX; ++k)
@@ -204,15 +221,32 @@ static ovoid_status upload_triangles(ovoid_context *context, const ovoid_mesh *m
         for (size_t j = 0; j < OV_LEAF; ++j) {
             const size_t at = leaf * OV_LEAF + j;
             put_triangle(mesh, order[at < facets->triangles ? at : facets->triangles - 1],
-                         facets->origin, packed + leaf * leaf_floats, j, box);
+                         facets->origin, packed + leaf % piece * leaf_floats, j, box);
         }
+        const size_t packed_leaves = leaf % piece + 1;
+        if (packed_leaves == piece || leaf + 1 == leaves)
+            OV_TRY(ov_buffer_write(context, &facets->leaves, (leaf + 1 - packed_leaves) * bytes,
+                                   packed, packed_leaves * bytes));
     }
+cleanup:
+    free(packed);
+    return status;
+}
+
+static ovoid_status upload_triangles(ovoid_context *context, const ovoid_mesh *mesh,
+                                     const uint32_t *order, ov_facets *facets) {
+    ovoid_status status = OVOID_OK;
+    const size_t leaves = (facets->triangles + OV_LEAF - 1) / OV_LEAF;
+    float *boxes = NULL;
+    size_t floats = 0;
+    float *const low_high = ov_alloc(context, leaves * BOX, sizeof *low_high, "boxes of triangles");
+    if (!low_high)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(upload_leaves(context, mesh, order, facets, leaves, low_high));
     OV_TRY(ov_tree_build(context, low_high, leaves, &facets->tree, &boxes, &floats));
     OV_TRY(upload(context, &facets->boxes, boxes, floats, "boxes of triangles"));
-    OV_TRY(upload(context, &facets->leaves, packed, leaves * leaf_floats, "triangles of a mesh"));
 cleanup:
     free(boxes);
-    free(packed);
     free(low_high);
     return status;
 }
@@ -220,7 +254,7 @@ cleanup:
 /* ---- facets ------------------------------------------------------------------------------- */
 
 ovoid_status ov_facets_create(ovoid_context *context, const ovoid_mesh *mesh, bool outer_only,
-                              const double origin[3], ov_facets *facets) {
+                              unsigned parts, const double origin[3], ov_facets *facets) {
     ovoid_status status = OVOID_OK;
     ov_facets made = {0};
     uint32_t *order = NULL;
@@ -230,8 +264,12 @@ ovoid_status ov_facets_create(ovoid_context *context, const ovoid_mesh *mesh, bo
                        "%zu vertices and %zu triangles are more points than distances are taken of",
                        mesh->vertices, mesh->triangles);
     OV_TRY(order_triangles(context, mesh, outer_only, &order, &made.triangles));
-    OV_TRY(list_points(context, mesh, order, &made));
-    OV_TRY(upload_triangles(context, mesh, order, &made));
+    if (parts & OV_FACETS_POINTS)
+        OV_TRY(list_points(context, mesh, order, &made));
+    else if (parts & OV_FACETS_VERTICES)
+        OV_TRY(list_vertices(context, mesh, order, &made));
+    if (parts & OV_FACETS_TRIANGLES)
+        OV_TRY(upload_triangles(context, mesh, order, &made));
     *facets = made;
 cleanup:
     if (status != OVOID_OK)
@@ -330,45 +368,64 @@ static void middle_of(const ovoid_mesh *a, const ovoid_mesh *b, double origin[3]
         origin[k] = 0.5 * low[k] + 0.5 * high[k];
 }
 
-static ovoid_status check_facets(ovoid_context *context, const ov_facets *facets, const char *which,
-                                 bool outer_only) {
-    if (facets->triangles > 0)
-        return OVOID_OK;
+/* From the points of one mesh to the triangles of the other. */
+static ovoid_status measure_meshes(ovoid_context *context, const ovoid_mesh *from,
+                                   const ovoid_mesh *to, bool outer_only, const double origin[3],
+                                   directed *result, float *of_vertices) {
+    ovoid_status status = OVOID_OK;
+    ov_facets points = {0}, triangles = {0};
+    OV_TRY(ov_facets_create(context, from, outer_only, OV_FACETS_POINTS, origin, &points));
+    OV_TRY(ov_facets_create(context, to, outer_only, OV_FACETS_TRIANGLES, origin, &triangles));
+    OV_TRY(measure_directed(context, &points, &triangles, result, of_vertices));
+cleanup:
+    ov_facets_destroy(&points);
+    ov_facets_destroy(&triangles);
+    return status;
+}
+
+static ovoid_status check_mesh(ovoid_context *context, const ovoid_mesh *mesh, const char *which,
+                               bool outer_only) {
+    for (size_t t = 0; t < mesh->triangles; ++t)
+        if (counts(mesh, t, outer_only))
+            return OVOID_OK;
     return ov_fail(context, OVOID_ERROR_EMPTY, "the %s mesh has no %s: there are no distances",
                    which, outer_only ? "outer component" : "triangle");
 }
 
-ovoid_status ovoid_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
-                                  bool outer_only, ovoid_distances *distances, float *from_a) {
+ovoid_status ov_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
+                               bool outer_only, ovoid_distances *distances, float *from_a,
+                               float *from_b) {
     ovoid_status status = OVOID_OK;
-    ov_facets first = {0}, second = {0};
     directed forward, backward;
     double origin[3];
-    float *of_vertices = NULL;
-    if (!a || !b || !distances)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "distances are of two meshes");
     middle_of(a, b, origin);
-    if (from_a) {
-        of_vertices = ov_alloc(context, a->vertices, sizeof *of_vertices, "distances");
-        if (!of_vertices)
-            return OVOID_ERROR_MEMORY;
-    }
-    OV_TRY(ov_facets_create(context, a, outer_only, origin, &first));
-    OV_TRY(check_facets(context, &first, "first", outer_only));
-    OV_TRY(ov_facets_create(context, b, outer_only, origin, &second));
-    OV_TRY(check_facets(context, &second, "second", outer_only));
-    OV_TRY(measure_directed(context, &first, &second, &forward, of_vertices));
-    OV_TRY(measure_directed(context, &second, &first, &backward, NULL));
-    if (from_a)
-        memcpy(from_a, of_vertices, a->vertices * sizeof *from_a);
+    OV_TRY(check_mesh(context, a, "first", outer_only));
+    OV_TRY(check_mesh(context, b, "second", outer_only));
+    OV_TRY(measure_meshes(context, a, b, outer_only, origin, &forward, from_a));
+    OV_TRY(measure_meshes(context, b, a, outer_only, origin, &backward, from_b));
     *distances = (ovoid_distances){.hausdorff = fmax(forward.largest, backward.largest),
                                    .forward = forward.largest,
                                    .backward = backward.largest,
                                    .mean = 0.5 * (forward.mean + backward.mean),
                                    .rms = sqrt(0.5 * (forward.square + backward.square))};
 cleanup:
-    ov_facets_destroy(&first);
-    ov_facets_destroy(&second);
+    return status;
+}
+
+ovoid_status ovoid_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
+                                  bool outer_only, ovoid_distances *distances, float *from_a) {
+    float *of_vertices = NULL;
+    if (!a || !b || !distances)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "distances are of two meshes");
+    if (from_a) {
+        of_vertices = ov_alloc(context, a->vertices, sizeof *of_vertices, "distances");
+        if (!of_vertices)
+            return OVOID_ERROR_MEMORY;
+    }
+    const ovoid_status status =
+        ov_mesh_distances(context, a, b, outer_only, distances, of_vertices, NULL);
+    if (from_a && status == OVOID_OK)
+        memcpy(from_a, of_vertices, a->vertices * sizeof *from_a);
     free(of_vertices);
     return status;
 }

@@ -1,4 +1,5 @@
 #include "surface/measure.h"
+#include "surface/distance.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -35,6 +36,33 @@ static void compare_contents(const ovoid_mesh *original, const ovoid_mesh *spars
     *volume = pair_of(first.volume, second.volume);
 }
 
+static double largest_of_outer(const ovoid_mesh *mesh, const float *distance) {
+    double largest = 0.0;
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        if (mesh->component[mesh->component_of[v]].outer)
+            largest = fmax(largest, distance[v]);
+    return largest;
+}
+
+/* The distances of the whole surfaces, and with them the deviation. */
+static ovoid_status compare_vertices(ovoid_context *context, const ovoid_mesh *original,
+                                     const ovoid_mesh *sparse, ovoid_measures *measures) {
+    ovoid_status status = OVOID_OK;
+    float *const first = ov_alloc(context, original->vertices, sizeof *first, "distances");
+    float *const second = ov_alloc(context, sparse->vertices, sizeof *second, "distances");
+    if (!first || !second) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    OV_TRY(
+        ov_mesh_distances(context, original, sparse, false, &measures->distances, first, second));
+    measures->deviation = fmax(largest_of_outer(original, first), largest_of_outer(sparse, second));
+cleanup:
+    free(first);
+    free(second);
+    return status;
+}
+
 ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *original,
                                const ovoid_mesh *sparse, bool smooth, bool distances,
                                ovoid_measures *measures) {
@@ -47,7 +75,7 @@ ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *origina
     compare_contents(original, sparse, smooth, false, &made.area, &made.volume);
     compare_contents(original, sparse, smooth, true, &made.area_outer, &made.volume_outer);
     if (distances) {
-        OV_TRY(ovoid_mesh_distances(context, original, sparse, false, &made.distances, NULL));
+        OV_TRY(compare_vertices(context, original, sparse, &made));
         made.distances_outer = made.distances;
         if (made.outer_original < original->components || made.outer_sparse < sparse->components)
             OV_TRY(

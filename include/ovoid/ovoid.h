@@ -114,6 +114,25 @@ OVOID_API ovoid_status ovoid_context_open_device(ovoid_context *context, const c
 /* The opened device, NULL before one is opened. */
 OVOID_API const ovoid_device_info *ovoid_context_device(const ovoid_context *context);
 
+/* What a kernel took on the device. */
+typedef struct ovoid_kernel_time {
+    const char *name; /* of the kernel, in kernels/; belongs to the library */
+    uint64_t launches;
+    double seconds; /* by the device's clock, the sum of all launches; NAN where the driver does not
+                       tell them all */
+} ovoid_kernel_time;
+
+/* Counts and times each kernel launched from now on, on the opened device and on those opened later
+ * (true), or no longer (false, as it is at first). May be called at any time: waits for what is
+ * under way. true begins with no kernels, and so does opening a device; after false the times can
+ * still be had. Results do not change, and without it nothing is spent on it. */
+OVOID_API ovoid_status ovoid_context_profile(ovoid_context *context, bool on);
+
+/* What was counted, the longest first: *times is an array of *count entries to be freed with
+ * ovoid_free(), NULL when there are none. Waits for what is under way. */
+OVOID_API ovoid_status ovoid_context_kernel_times(ovoid_context *context, ovoid_kernel_time **times,
+                                                  size_t *count);
+
 /* Frees memory that the library handed over; NULL is fine. */
 OVOID_API void ovoid_free(void *memory);
 
@@ -254,19 +273,28 @@ OVOID_API ovoid_status ovoid_model_field(ovoid_context *context, const ovoid_mod
 
 /* ---- fitting ------------------------------------------------------------------------------ */
 
+/* Of the constrained points, angstrom. */
+#define OVOID_DEFAULT_SPACING_ADAPTIVE 0.7 /* less for molecules of less than 640 atoms */
+#define OVOID_DEFAULT_SPACING_L1 0.8
+
 typedef enum ovoid_method {
-    OVOID_METHOD_L1 = 0 /* the paper's Algorithm 1 */
+    OVOID_METHOD_ADAPTIVE = 0, /* merges the atoms' Gaussians, then fits what is left to the
+                                  surface: fewer ellipsoids, nearer to it, in a fraction of the
+                                  time */
+    OVOID_METHOD_L1            /* the paper's Algorithm 1 */
 } ovoid_method;
 
 /* What a progress callback sees: while sampling after each piece of the lattice (with the points so
  * far), then after each iteration. */
 typedef struct ovoid_progress {
-    const char *stage;   /* "sample", "sparse" or "accuracy" */
+    const char *stage;   /* "sample"; of l1 "sparse" or "accuracy"; of adaptive "merge", "refine",
+                            "repair", "grow" or "shrink" */
     uint64_t iteration;  /* 1 .. iterations; 0 while sampling */
-    uint64_t iterations; /* how many there will be at most */
+    uint64_t iterations; /* how many there will be at most; 0 where nobody knows (adaptive) */
     uint64_t ellipsoids;
     uint64_t points;
-    double accuracy_term; /* E_s = sum_k (phi~ - phi)^2 over the constrained points */
+    double accuracy_term; /* E_s = sum_k (phi~ - phi)^2 over the constrained points; of adaptive the
+                             sum of weighted squared residuals */
     double sparse_term;   /* E_l1 = sum_i |c_i| + |d_i1| + |d_i2| + |d_i3|, square-root variables */
     double accuracy_weight; /* w_s */
     double sparse_weight;   /* w_l */
@@ -310,19 +338,47 @@ typedef struct ovoid_l1_options {
     uint32_t max_backtracks;     /* trial steps of one search before giving up (open): 30 */
 } ovoid_l1_options;
 
+/* What the adaptive method is to reach. */
+typedef enum ovoid_goal {
+    OVOID_GOAL_TOLERANCE = 0, /* the outer surfaces are nowhere further apart than `tolerance`, with
+                                 as few ellipsoids as it finds */
+    OVOID_GOAL_ELLIPSOIDS,    /* `ellipsoids` of them */
+    OVOID_GOAL_RATIO          /* `ratio` ellipsoids per atom, at least one */
+} ovoid_goal;
+
+/* Half an angstrom: what an atom of a well-ordered crystal moves by itself (B = 20 angstrom^2 is a
+ * root mean square displacement of 0.5 angstrom along each axis). */
+#define OVOID_DEFAULT_TOLERANCE 0.5
+
+typedef struct ovoid_adaptive_options {
+    ovoid_goal goal;     /* TOLERANCE */
+    double tolerance;    /* angstrom: OVOID_DEFAULT_TOLERANCE */
+    uint32_t ellipsoids; /* for OVOID_GOAL_ELLIPSOIDS; more than atoms is an error */
+    double ratio;        /* for OVOID_GOAL_RATIO, at most 1 */
+    uint32_t effort;     /* 1 (the default) to 10: how many starts and repairs are tried */
+    uint32_t steps;      /* Levenberg-Marquardt steps of one refinement at most: 60; 0 leaves the
+                            merged Gaussians as they are */
+    double mesh_spacing; /* of the meshes that surfaces are judged on, angstrom: 0.5 */
+} ovoid_adaptive_options;
+
 typedef struct ovoid_fit_options {
     ovoid_method method;
     double decay;    /* d, angstrom^-2 */
     double isovalue; /* c */
-    double spacing;  /* of the lattice of constrained points, angstrom (open) */
-    double padding;  /* of the box about the atom centres, angstrom (open) */
+    double spacing;  /* of the lattice of constrained points, angstrom (open); 0: the method's own,
+                        OVOID_DEFAULT_SPACING_... */
+    double padding;  /* of the box about the atom centres, angstrom (open); adaptive takes what the
+                        field needs, if that is more */
+    ovoid_adaptive_options adaptive;
     ovoid_l1_options l1;
     ovoid_progress_fn progress; /* may be NULL */
     void *user;
 } ovoid_fit_options;
 
 /* Where the time of a fit went, and how much was done. The seconds are measured on the host between
- * waits for the device, so they include launches. */
+ * waits for the device, so they include launches. Method adaptive waits too seldom for that: of it,
+ * only launches are filled in, sampling included, and all else is 0. ovoid_context_profile() tells
+ * the times of kernels for both methods. */
 typedef struct ovoid_fit_profile {
     double lists_seconds;   /* building the pack lists */
     double field_seconds;   /* phi~ and the residual, including every trial step */
@@ -335,11 +391,17 @@ typedef struct ovoid_fit_profile {
 } ovoid_fit_profile;
 
 typedef struct ovoid_fit_result {
+    double spacing;  /* of the constrained points, angstrom: what was asked for or the default */
     uint64_t points; /* constrained points */
     uint64_t ellipsoids;
     uint64_t iterations; /* done */
-    double rms_error;    /* sqrt(E_s / points) */
-    double max_error;    /* max_k |phi~ - phi| over the constrained points */
+    double rms_error;    /* of l1: sqrt(E_s / points); of adaptive 0 */
+    double max_error;    /* of l1: max_k |phi~ - phi| over the constrained points; of adaptive 0 */
+    bool reached;        /* the goal; always true of l1, and of adaptive where the molecule's field
+                            nowhere reaches the isovalue: the model follows the field then */
+    double distance;     /* largest between the outer surfaces, measured, angstrom; NAN where it was
+                            not measured (l1, or no surface) */
+    uint64_t solver_iterations; /* of conjugate gradients (adaptive) */
     double sample_seconds;
     double fit_seconds;
     ovoid_fit_profile profile;

@@ -133,6 +133,10 @@ typedef struct ovoid_measures {
     uint64_t outer_original, outer_sparse;           /* of these, outer ones */
     ovoid_distances distances;
     ovoid_distances distances_outer;
+    double deviation; /* largest distance of a vertex of either outer surface from the other whole
+                         surface, angstrom: unlike the Hausdorff distance of the outer surfaces it
+                         does not jump when the neck of a tunnel opens or closes, and unlike that of
+                         the whole ones not with a small cavity. What a tolerance is about. */
     double seconds_mesh, seconds_distances;
 } ovoid_measures;
 

@@ -12,14 +12,20 @@ for command in "fit --help" "fit -h" "help fit" "fit molecule.pqr --decay 1 --he
     run "$OVOID" $command
     expect_code 0
     expect_silent
-    for text in "Usage: ovoid fit MOLECULE" "Exit codes:" "Examples:" "OVOID_DEVICE" "(default 0.5 Å⁻²)"; do
+    for text in "Usage: ovoid fit MOLECULE" "Exit codes:" "Examples:" "OVOID_DEVICE" "(default 0.5 Å⁻²)" \
+        "(default adaptive)" "(default 0.5 Å)" "(default 0.7 Å, of method l1 0.8 Å)" \
+        "  7    a fit did not reach its goal" "B of 20 Å²" "ovoid fit molecule.pqr  "; do
         expect_out "$text"
     done
     for option in output report trace format device method quiet help decay isovalue spacing padding \
         iterations sparse-iterations epsilon max-error prune-below prune-every armijo shrink grow \
-        max-backtracks kernel mesh-spacing no-measure; do
-        expect_out "--$option"
+        max-backtracks first-step kernel mesh-spacing no-measure tolerance ellipsoids ratio levels effort \
+        steps profile; do
+        grep -q "^ .*--$option" "$out" || fail "--$option should have an entry"
     done
+    awk '{ gsub(/[^ -~]+/, "."); if (length($0) > 100) exit 1 }' "$out" || fail "the help is too wide"
+    [ "$(grep -A 1 '^Examples:' "$out" | grep -c '^  ovoid fit molecule.pqr  ')" -eq 1 ] ||
+        fail "the plainest example should be the first"
 done
 
 for command in "mesh --help" "mesh -h" "help mesh"; do
@@ -42,7 +48,7 @@ for command in "measure --help" "measure -h" "help measure"; do
     for text in "Usage: ovoid measure MOLECULE MODEL" "Exit codes:" "Examples:" "OVOID_DEVICE"; do
         expect_out "$text"
     done
-    for option in report format device quiet help spacing isovalue vertices; do
+    for option in report format device quiet help spacing isovalue vertices profile; do
         expect_out "--$option"
     done
 done

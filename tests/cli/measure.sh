@@ -1,7 +1,7 @@
 # Measures of a model against its molecule, alone and at the end of a fit; see check_measures.c.
 need_device
 make_helix 12 a.xyzr
-run "$OVOID" fit a.xyzr --iterations 40 --report fit.json
+run "$OVOID" fit a.xyzr --method l1 --iterations 40 --report fit.json
 expect_code 0
 expect_silent
 for line in "area  *[0-9.]* Å², of the model [0-9.]* Å²: error [0-9.e-]* %" \
@@ -62,11 +62,11 @@ run "$CHECK_MEASURES" fit.json m.json
 expect_code 0
 
 # A fit without measures, with a coarser mesh, and of a model without a surface.
-run "$OVOID" fit a.xyzr --iterations 5 --no-measure --report none.json
+run "$OVOID" fit a.xyzr --method l1 --iterations 5 --no-measure --report none.json
 expect_code 0
 grep -qE '^(area|volume|distance)' "$out" && fail "no measures were asked for"
 grep -qE '"(area|hausdorff)"' none.json && fail "no measures were asked for"
-run "$OVOID" fit a.xyzr --iterations 5 --mesh-spacing 0.8 --report fit.json
+run "$OVOID" fit a.xyzr --method l1 --iterations 5 --mesh-spacing 0.8 --report fit.json
 expect_code 0
 expect_out "mesh      spacing 0.8 Å, exact vertices"
 run "$OVOID" measure a.xyzr a.ovoid --spacing 0.8 --report m.json -q

@@ -2,7 +2,7 @@
 need_device
 make_helix 12 a.xyzr
 cp a.xyzr ../a.xyzr
-run "$OVOID" fit a.xyzr --iterations 5 -q --no-measure --isovalue 1.2
+run "$OVOID" fit a.xyzr --method l1 --iterations 5 -q --no-measure --isovalue 1.2
 expect_code 0
 
 # By default a PLY file under the input's name in the current folder.

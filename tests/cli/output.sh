@@ -1,7 +1,7 @@
 # Where the model goes, and that nothing is left of it when it cannot go there.
 need_device
 make_helix 6 a.xyzr
-few="--iterations 5"
+few="--method l1 --iterations 5"
 
 # By default into the current folder, under the molecule's name.
 mkdir sub
@@ -45,7 +45,7 @@ head -n 1 real.ovoid | grep -q "ovoid model" || fail "the link's target should h
 rm -r ./*.ovoid sub
 
 # Refused before the work: with so many iterations the test would not end otherwise.
-many="--iterations 4000000000"
+many="--method l1 --iterations 4000000000"
 cannot() {
     text=$1
     shift

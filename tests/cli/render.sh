@@ -1,7 +1,7 @@
 # Pictures: views, where they go, and what is refused before any work.
 need_device
 make_helix 6 a.xyzr
-run "$OVOID" fit a.xyzr --iterations 40 -q
+run "$OVOID" fit a.xyzr --method l1 --iterations 40 -q
 expect_code 0
 small="--size 40x30 --samples 1"
 

@@ -2,7 +2,7 @@
 need_device
 make_helix 30 a.xyzr
 echo "9 9 9 0" >>a.xyzr
-run "$OVOID" fit a.xyzr --iterations 60 --decay 0.45 --isovalue 1.1 --spacing 0.9 --padding 2.5 \
+run "$OVOID" fit a.xyzr --method l1 --iterations 60 --decay 0.45 --isovalue 1.1 --spacing 0.9 --padding 2.5 \
     --prune-every 7 --mesh-spacing 0.6 --report r.json --trace t.csv
 expect_code 0
 expect_silent
@@ -19,7 +19,7 @@ run "$CHECK_REPORT" r.json a.ovoid t.csv atoms=31 zero_radius_atoms=1 atoms_skip
 expect_code 0
 
 # Spheres stay where their atoms are and as wide; their number and amplitudes are what changes.
-run "$OVOID" fit a.xyzr --iterations 60 --decay 0.45 --kernel sphere -o s.ovoid --report s.json \
+run "$OVOID" fit a.xyzr --method l1 --iterations 60 --decay 0.45 --kernel sphere -o s.ovoid --report s.json \
     --trace s.csv
 expect_code 0
 expect_out "iterations of method l1, spheres at the atoms"
@@ -34,18 +34,40 @@ awk '/^#|^amplitude/ { next }
 rm -f s.ovoid s.json s.csv
 
 # On standard output, for a pipe.
-"$OVOID" fit a.xyzr --iterations 3 -q --report - >r.json 2>"$err"
+"$OVOID" fit a.xyzr --method l1 --iterations 3 -q --report - >r.json 2>"$err"
 code=$?
 expect_code 0
-"$OVOID" fit a.xyzr --iterations 3 -q --trace - >t.csv 2>"$err"
+"$OVOID" fit a.xyzr --method l1 --iterations 3 -q --trace - >t.csv 2>"$err"
 run "$CHECK_REPORT" r.json a.ovoid t.csv atoms=31
 expect_code 0
 
 # Names that are not UTF-8, or hold quotes or line ends, still give JSON and whole header lines.
 name=$(printf 'b"\\\n\377.xyzr')
 cp a.xyzr "$name"
-run "$OVOID" fit "$name" --iterations 3 -o b.ovoid --report r.json --trace t.csv
+run "$OVOID" fit "$name" --method l1 --iterations 3 -o b.ovoid --report r.json --trace t.csv
 expect_code 0
 run "$CHECK_REPORT" r.json b.ovoid t.csv atoms=31
 expect_code 0
 iconv -f UTF-8 -t UTF-8 r.json >/dev/null 2>&1 || fail "the report should be UTF-8"
+
+# Method adaptive has other options, a goal, and other columns in its trace.
+rm -f ./*
+make_chain 30 a.xyzr
+run "$OVOID" fit a.xyzr --tolerance 0.8 --effort 2 --steps 50 --decay 0.45 --isovalue 1.1 \
+    --mesh-spacing 0.6 --report r.json --trace t.csv
+expect_code 0
+expect_silent
+expect_out "surface   decay 0.45 Å⁻², isovalue 1.1"
+expect_out "spacing 0.35 Å"
+expect_out "mesh      spacing 0.6 Å"
+expect_out "conjugate gradients, method adaptive"
+grep -q '^goal      outer surfaces within 0.8 Å: reached, 0\.[0-9]* Å$' "$out" ||
+    fail "the summary should say asked and reached"
+grep -q '^error' "$out" && fail "errors over the points belong to method l1"
+run "$CHECK_REPORT" r.json a.ovoid t.csv method=adaptive atoms=30 decay=0.45 isovalue=1.1 spacing=0.35 \
+    mesh_spacing=0.6 options.effort=2 options.steps=50 goal.name=tolerance goal.asked=0.8 \
+    goal.reached=true
+expect_code 0
+grep -q '^# settings: method adaptive, spacing 0.35, .*tolerance 0.8, effort 2, steps 50, mesh-spacing 0.6$' \
+    a.ovoid || fail "the model should say how it was made"
+grep -q '^# goal: reached$' a.ovoid || fail "the model should say that its goal was reached"

@@ -56,6 +56,14 @@ make_helix() {
         >"$2"
 }
 
+# make_chain ATOMS FILE: the same of a tighter helix, with atoms as near as bonded ones: they merge
+# well.
+make_chain() {
+    awk -v n="$1" 'BEGIN { for (i = 0; i < n; i++)
+        printf "%.4f %.4f %.4f %.2f\n", 1.5 * cos(i), 1.5 * sin(i), 0.5 * i, 1.4 + 0.1 * (i % 4) }' \
+        >"$2"
+}
+
 # rows FILE: lines that do not begin with '#'.
 rows() { grep -cv '^#' "$1"; }
 

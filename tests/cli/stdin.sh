@@ -2,7 +2,7 @@
 need_device
 make_helix 8 a.xyzr
 awk '{ printf "ATOM %d C MOL 1 %s %s %s 0.0 %s\n", NR, $1, $2, $3, $4 }' a.xyzr >a.pqr
-few="--iterations 10 -q"
+few="--method l1 --iterations 10 -q"
 run "$OVOID" fit a.xyzr $few -o a.ovoid
 expect_code 0
 for source in "cat a.xyzr" "cat a.pqr" "gzip -c a.xyzr" "gzip -c a.pqr"; do

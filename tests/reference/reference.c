@@ -143,6 +143,29 @@ void reference_moments(const ov_quadric *quadric, const double *xyz, const doubl
     }
 }
 
+void reference_gram(const ov_quadric *quadric, const double *xyz, const double *w, size_t count,
+                    reference_sum gram[OV_GRAM]) {
+    memset(gram, 0, OV_GRAM * sizeof *gram);
+    for (size_t k = 0; k < count; ++k) {
+        double z[3], magnified, power[3][5];
+        const double e = evaluate(quadric, xyz + 3 * k, z, &magnified);
+        for (int axis = 0; axis < 3; ++axis) {
+            power[axis][0] = 1.0;
+            for (int n = 1; n <= 4; ++n)
+                power[axis][n] = power[axis][n - 1] * z[axis];
+        }
+        size_t j = 0;
+        for (int degree = 0; degree <= 4; ++degree)
+            for (int x = degree; x >= 0; --x)
+                for (int y = degree - x; y >= 0; --y, ++j) {
+                    const double part =
+                        w[k] * e * e * power[0][x] * power[1][y] * power[2][degree - x - y];
+                    gram[j].value += part;
+                    gram[j].scale += fabs(part) * 2.0 * magnified;
+                }
+    }
+}
+
 /* Solves the rows and columns `use` of a x = b (n <= 3) by Gaussian elimination with pivoting. */
 static bool solve(double a[3][3], const double b[3], const int *use, int n, double *x) {
     double m[3][4];

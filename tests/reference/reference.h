@@ -40,6 +40,10 @@ void reference_gradient(const ov_quadric *quadrics, size_t count, const double y
 void reference_moments(const ov_quadric *quadric, const double *xyz, const double *u, size_t count,
                        reference_sum moments[OV_MONOMIALS]);
 
+/* sum_k w_k e(y_k)^2 z^alpha, z = y_k - mu, in the order of OV_GRAM. */
+void reference_gram(const ov_quadric *quadric, const double *xyz, const double *w, size_t count,
+                    reference_sum gram[OV_GRAM]);
+
 /* Least q of a term over a box (low x, y, z, high x, y, z), exactly: the minimum lies inside, on a
  * face, an edge or a corner, and all 27 are tried. */
 double reference_least_exponent(const ov_quadric *quadric, const double box[6]);

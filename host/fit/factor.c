@@ -1,0 +1,135 @@
+#include "fit/factor.h"
+
+#include <math.h>
+
+void ov_factor_of_quadric(const ov_quadric *quadric, double parameters[OV_FACTOR_PARAMETERS]) {
+    const double *const a = quadric->a;
+    double *const l = parameters + OV_FACTOR_L;
+    parameters[OV_FACTOR_AMPLITUDE] = log(quadric->amplitude);
+    for (int k = 0; k < 3; ++k)
+        parameters[OV_FACTOR_CENTRE + k] = quadric->centre[k];
+    l[0] = sqrt(a[0]);
+    l[1] = a[1] / l[0];
+    l[2] = a[2] / l[0];
+    l[3] = sqrt(fmax(a[3] - l[1] * l[1], 1e-14 * a[3]));
+    l[4] = (a[4] - l[1] * l[2]) / l[3];
+    l[5] = sqrt(fmax(a[5] - l[2] * l[2] - l[4] * l[4], 1e-14 * a[5]));
+}
+
+void ov_factor_quadric(const double parameters[OV_FACTOR_PARAMETERS], ov_quadric *quadric) {
+    const double *const l = parameters + OV_FACTOR_L;
+    quadric->amplitude = exp(parameters[OV_FACTOR_AMPLITUDE]);
+    for (int k = 0; k < 3; ++k)
+        quadric->centre[k] = parameters[OV_FACTOR_CENTRE + k];
+    quadric->a[0] = l[0] * l[0];
+    quadric->a[1] = l[0] * l[1];
+    quadric->a[2] = l[0] * l[2];
+    quadric->a[3] = l[1] * l[1] + l[3] * l[3];
+    quadric->a[4] = l[1] * l[2] + l[3] * l[4];
+    quadric->a[5] = l[2] * l[2] + l[4] * l[4] + l[5] * l[5];
+}
+
+/* Annihilates a[p][q] by a rotation of the axes p and q; v's rows turn with them. */
+static void jacobi_turn(double a[3][3], double v[3][3], int p, int q) {
+    if (a[p][q] == 0.0)
+        return;
+    const double theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+    const double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1.0));
+    const double c = 1.0 / sqrt(t * t + 1.0), s = t * c;
+    for (int k = 0; k < 3; ++k) {
+        const double kp = a[k][p], kq = a[k][q];
+        a[k][p] = c * kp - s * kq;
+        a[k][q] = s * kp + c * kq;
+    }
+    for (int k = 0; k < 3; ++k) {
+        const double pk = a[p][k], qk = a[q][k];
+        a[p][k] = c * pk - s * qk;
+        a[q][k] = s * pk + c * qk;
+        const double vp = v[p][k], vq = v[q][k];
+        v[p][k] = c * vp - s * vq;
+        v[q][k] = s * vp + c * vq;
+    }
+}
+
+/* Eigenvalues in descending order; rows of r are their directions, together a rotation. */
+static void eigen(const double form[6], double value[3], double r[3][3]) {
+    double a[3][3] = {
+        {form[0], form[1], form[2]}, {form[1], form[3], form[4]}, {form[2], form[4], form[5]}};
+    double v[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    for (int sweep = 0; sweep < 12; ++sweep) {
+        jacobi_turn(a, v, 0, 1);
+        jacobi_turn(a, v, 0, 2);
+        jacobi_turn(a, v, 1, 2);
+    }
+    int order[3] = {0, 1, 2};
+    for (int k = 0; k < 2; ++k)
+        for (int j = 0; j < 2; ++j)
+            if (a[order[j]][order[j]] < a[order[j + 1]][order[j + 1]]) {
+                const int swap = order[j];
+                order[j] = order[j + 1];
+                order[j + 1] = swap;
+            }
+    for (int p = 0; p < 3; ++p) {
+        value[p] = a[order[p]][order[p]];
+        for (int k = 0; k < 3; ++k)
+            r[p][k] = v[order[p]][k];
+    }
+    for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        r[2][k] = r[0][i] * r[1][j] - r[0][j] * r[1][i];
+    }
+}
+
+/* The angles of ov_rotation(), alpha 0 where only its sum or difference with gamma counts. Near
+ * there alpha is known to rounding only; gamma is that of R R_x(alpha)^T, so that R is kept all the
+ * same. */
+static void angles_of_rotation(double r[3][3], double angle[3]) {
+    const double cosine = hypot(r[0][0], r[1][0]);
+    angle[0] = cosine > 1e-15 ? atan2(r[2][1], r[2][2]) : 0.0;
+    angle[1] = atan2(r[2][0], cosine);
+    const double c = cos(angle[0]), s = sin(angle[0]);
+    angle[2] = atan2(s * r[0][2] - c * r[0][1], c * r[1][1] - s * r[1][2]);
+}
+
+void ov_ellipsoid_of_quadric(const ov_quadric *quadric, ovoid_ellipsoid *ellipsoid) {
+    double r[3][3];
+    eigen(quadric->a, ellipsoid->decay, r);
+    angles_of_rotation(r, ellipsoid->angle);
+    ellipsoid->amplitude = quadric->amplitude;
+    for (int k = 0; k < 3; ++k)
+        ellipsoid->centre[k] = quadric->centre[k];
+}
+
+/* Exponent at the cut-off; negative where nothing is reached. */
+static double reach(const double *parameters, double cutoff) {
+    return parameters[OV_FACTOR_AMPLITUDE] - log(cutoff);
+}
+
+/* sqrt(q) L^-1, lower triangle, zero where nothing is reached. */
+static void hull(const double *parameters, double cutoff, double h[6]) {
+    const double *const l = parameters + OV_FACTOR_L;
+    const double q = reach(parameters, cutoff), root = q < 0.0 ? 0.0 : sqrt(q);
+    h[0] = root / l[0];
+    h[3] = root / l[3];
+    h[5] = root / l[5];
+    h[1] = -l[1] * h[0] / l[3];
+    h[4] = -l[4] * h[3] / l[5];
+    h[2] = -(l[2] * h[0] + l[4] * h[1]) / l[5];
+}
+
+double ov_factor_motion(const double from[OV_FACTOR_PARAMETERS],
+                        const double to[OV_FACTOR_PARAMETERS], double cutoff) {
+    double before[6], after[6], way = 0.0, growth = 0.0;
+    if (reach(from, cutoff) < 0.0 && !(reach(to, cutoff) < 0.0))
+        return INFINITY;
+    hull(from, cutoff, before);
+    hull(to, cutoff, after);
+    for (int k = 0; k < 3; ++k) {
+        const double step = to[OV_FACTOR_CENTRE + k] - from[OV_FACTOR_CENTRE + k];
+        way += step * step;
+    }
+    for (int k = 0; k < 6; ++k)
+        growth += (after[k] - before[k]) * (after[k] - before[k]);
+    const double motion = sqrt(way) + sqrt(growth);
+    return isfinite(motion) ? motion : INFINITY;
+}

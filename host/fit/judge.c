@@ -1,0 +1,239 @@
+#include "fit/judge.h"
+#include "fit/factor.h"
+#include "surface/distance.h"
+#include "surface/march.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* How much the whole surface's distance, cavities included, counts beside the outer one's, and the
+ * area's relative error (angstrom). */
+#define SCORE_WHOLE 0.3
+#define SCORE_AREA 10.0
+
+static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
+
+/* *mesh is NULL where there is no surface. */
+static ovoid_status mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
+                                const ovoid_mesh_options *meshing, ovoid_mesh **mesh) {
+    const ovoid_status status = ov_march(context, bodies, count, meshing, piece_limit, mesh);
+    if (status != OVOID_ERROR_EMPTY)
+        return status;
+    *mesh = NULL;
+    return OVOID_OK;
+}
+
+static bool has_outer(const ovoid_mesh *mesh) {
+    for (size_t c = 0; mesh && c < mesh->components; ++c)
+        if (mesh->component[c].outer)
+            return true;
+    return false;
+}
+
+ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                             double isovalue, double spacing, ov_judge *judge) {
+    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay)};
+    ov_body *const bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
+    if (!bodies)
+        return OVOID_ERROR_MEMORY;
+    ovoid_mesh_options_init(&made.meshing);
+    made.meshing.isovalue = isovalue;
+    made.meshing.spacing = spacing;
+    for (size_t i = 0; i < atoms; ++i)
+        ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
+    ovoid_status status = mesh_bodies(context, bodies, atoms, &made.meshing, &made.mesh);
+    free(bodies);
+    if (status == OVOID_OK && made.mesh) {
+        made.content = ov_mesh_smooth(made.mesh, false);
+    }
+    if (status == OVOID_OK)
+        *judge = made;
+    else
+        ov_judge_destroy(&made);
+    return status;
+}
+
+void ov_judge_destroy(ov_judge *judge) {
+    ovoid_mesh_destroy(&judge->mesh);
+    memset(judge, 0, sizeof *judge);
+}
+
+static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                               ovoid_mesh **mesh) {
+    ov_body *const bodies = ov_alloc(judge->context, count, sizeof *bodies, "ellipsoids");
+    if (!bodies)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < count; ++i) {
+        ovoid_ellipsoid ellipsoid;
+        ov_ellipsoid_of_quadric(&quadrics[i], &ellipsoid);
+        ov_body_of_ellipsoid(&ellipsoid, &bodies[i]);
+    }
+    const ovoid_status status = mesh_bodies(judge->context, bodies, count, &judge->meshing, mesh);
+    free(bodies);
+    return status;
+}
+
+static int by_distance(const void *a, const void *b) {
+    const ov_spot *const p = a, *const q = b;
+    if (p->distance != q->distance)
+        return p->distance > q->distance ? -1 : 1;
+    for (int k = 0; k < 3; ++k)
+        if (p->at[k] != q->at[k])
+            return p->at[k] < q->at[k] ? -1 : 1;
+    return 0;
+}
+
+static bool is_outer(const ovoid_mesh *mesh, size_t vertex) {
+    return mesh->component[mesh->component_of[vertex]].outer;
+}
+
+static void add_spots(const ovoid_mesh *mesh, const float *distance, double least, ov_spot *spots,
+                      size_t *count) {
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        if (distance[v] >= least && is_outer(mesh, v)) {
+            memcpy(spots[*count].at, mesh->xyz + 3 * v, sizeof spots->at);
+            spots[(*count)++].distance = distance[v];
+        }
+}
+
+/* Keeps the worst of each neighbourhood. */
+static void thin_spots(ov_spot *spots, size_t *count, double apart, size_t most) {
+    size_t kept = 0;
+    qsort(spots, *count, sizeof *spots, by_distance);
+    for (size_t n = 0; n < *count && kept < most; ++n) {
+        bool near = false;
+        for (size_t m = 0; m < kept && !near; ++m) {
+            double square = 0.0;
+            for (int k = 0; k < 3; ++k)
+                square += (spots[n].at[k] - spots[m].at[k]) * (spots[n].at[k] - spots[m].at[k]);
+            near = square < apart * apart;
+        }
+        if (!near)
+            spots[kept++] = spots[n];
+    }
+    *count = kept;
+}
+
+/* distance[v] of each vertex of `from` to the surface `to`. */
+static ovoid_status distances_of_vertices(ov_judge *judge, const ovoid_mesh *from,
+                                          const ovoid_mesh *to, float *distance) {
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = judge->context;
+    const double *const origin = judge->mesh->xyz;
+    ov_facets vertices = {0}, triangles = {0};
+    float *const squared = ov_alloc(context, from->vertices, sizeof *squared, "distances");
+    if (!squared)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_facets_create(context, from, false, OV_FACETS_VERTICES, origin, &vertices));
+    OV_TRY(ov_facets_create(context, to, false, OV_FACETS_TRIANGLES, origin, &triangles));
+    OV_TRY(ov_facets_distances(context, &triangles, vertices.xyz, vertices.points, squared));
+    for (size_t k = 0; k < vertices.points; ++k)
+        distance[vertices.vertex[k]] = sqrtf(squared[k]);
+cleanup:
+    ov_facets_destroy(&vertices);
+    ov_facets_destroy(&triangles);
+    free(squared);
+    return status;
+}
+
+static void judge_distances(const ovoid_mesh *mesh, const float *distance,
+                            ov_judgement *judgement) {
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        judgement->hausdorff = fmax(judgement->hausdorff, distance[v]);
+        if (is_outer(mesh, v))
+            judgement->deviation = fmax(judgement->deviation, distance[v]);
+    }
+}
+
+/* Fills in the judgement of a mesh of the model, and the distances of both meshes' vertices. */
+static ovoid_status judge_mesh(ov_judge *judge, const ovoid_mesh *mesh, float *from_original,
+                               float *from_model, ov_judgement *judgement) {
+    ovoid_status status = OVOID_OK;
+    const ov_content content = ov_mesh_smooth(mesh, false);
+    ov_judgement made = {.valid = true};
+    OV_TRY(distances_of_vertices(judge, judge->mesh, mesh, from_original));
+    OV_TRY(distances_of_vertices(judge, mesh, judge->mesh, from_model));
+    judge_distances(judge->mesh, from_original, &made);
+    judge_distances(mesh, from_model, &made);
+    made.area_error = fabs(content.area - judge->content.area) / judge->content.area;
+    made.volume_ratio = content.volume / judge->content.volume;
+    made.score = made.deviation + SCORE_WHOLE * (made.hausdorff - made.deviation) +
+                 SCORE_AREA * made.area_error;
+    *judgement = made;
+cleanup:
+    return status;
+}
+
+ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
+                            double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
+                            size_t *spot_count) {
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = judge->context;
+    ovoid_mesh *mesh = NULL;
+    float *from_original = NULL, *from_model = NULL;
+    ov_spot *found = NULL;
+    size_t found_count = 0;
+    *judgement = (ov_judgement){.hausdorff = INFINITY, .deviation = INFINITY, .score = INFINITY};
+    OV_TRY(mesh_model(judge, quadrics, count, &mesh));
+    if (has_outer(mesh) && has_outer(judge->mesh)) {
+        const size_t vertices = judge->mesh->vertices;
+        from_original = ov_alloc(context, vertices, sizeof *from_original, "distances");
+        from_model = ov_alloc(context, mesh->vertices, sizeof *from_model, "distances");
+        found = ov_alloc(context, vertices + mesh->vertices, sizeof *found, "spots");
+        if (!from_original || !from_model || !found) {
+            status = OVOID_ERROR_MEMORY;
+            goto cleanup;
+        }
+        OV_TRY(judge_mesh(judge, mesh, from_original, from_model, judgement));
+        add_spots(judge->mesh, from_original, least, found, &found_count);
+        add_spots(mesh, from_model, least, found, &found_count);
+        thin_spots(found, &found_count, apart, most);
+    }
+cleanup:
+    free(from_original);
+    free(from_model);
+    ovoid_mesh_destroy(&mesh);
+    if (status == OVOID_OK) {
+        *spots = found;
+        *spot_count = found_count;
+    } else {
+        free(found);
+    }
+    return status;
+}
+
+ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                            ov_judgement *judgement) {
+    ov_spot *spots = NULL;
+    size_t spot_count;
+    const ovoid_status status =
+        ov_judge_spots(judge, quadrics, count, INFINITY, 0.0, 0, judgement, &spots, &spot_count);
+    free(spots);
+    return status;
+}
+
+ovoid_status ov_judge_volume(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                             double *ratio) {
+    ovoid_mesh *mesh = NULL;
+    *ratio = 1.0;
+    if (!judge->mesh)
+        return OVOID_OK;
+    const ovoid_status status = mesh_model(judge, quadrics, count, &mesh);
+    if (mesh)
+        *ratio = ov_mesh_smooth(mesh, false).volume / judge->content.volume;
+    ovoid_mesh_destroy(&mesh);
+    return status;
+}
+
+/* Mean of |grad phi| / c over the surfaces of molecules, in units of sqrt(2 d). */
+#define MEAN_SLOPE 1.5
+#define FACTOR_MOST 1.1
+
+double ov_judge_amplitude_factor(const ov_judge *judge, double volume_ratio) {
+    if (!judge->mesh || !(judge->content.area > 0.0))
+        return 1.0;
+    const double per_log = judge->content.area / (MEAN_SLOPE * judge->root_2d);
+    const double log_factor = (1.0 - volume_ratio) * judge->content.volume / per_log;
+    return fmin(fmax(exp(log_factor), 1.0 / FACTOR_MOST), FACTOR_MOST);
+}

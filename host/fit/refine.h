@@ -1,0 +1,58 @@
+/*
+ * The accuracy step: Levenberg-Marquardt on sum_k weight_k r_k^2 over all parameters of all
+ * ellipsoids, every pass on the device.
+ */
+#ifndef OV_REFINE_H
+#define OV_REFINE_H
+
+#include "fit/solver.h"
+#include "fit/target.h"
+
+typedef struct ov_refine_options {
+    uint32_t steps;        /* at most, accepted or not */
+    uint32_t solver_steps; /* of conjugate gradients, at most */
+    double solver_tolerance;
+    double decrease;  /* stops after two steps in a row that gain a smaller share than this */
+    double damping;   /* lambda at the start */
+    double width_max; /* angstrom: no axis becomes longer, 1 / sqrt(decay) */
+    bool (*go_on)(uint32_t step, double misfit, void *user); /* may be NULL */
+    void *user;
+} ov_refine_options;
+
+/* What one evaluation of a model leaves on the device. */
+typedef struct ov_evaluation {
+    ov_terms terms;
+    ov_lists lists;
+    double *listed; /* parameters that the lists were built for */
+    float *skins;   /* and how far each ellipsoid may move before they are built again (angstrom) */
+    size_t listed_count, listed_capacity, skins_capacity;
+    const ov_points *listed_points;
+    ov_buffer value, u, active, sums; /* see kernels/misfit.cl */
+} ov_evaluation;
+
+typedef struct ov_refiner {
+    ovoid_context *context;
+    ov_operations operations;
+    ov_solver solver;
+    ov_kernel misfit;
+    ov_evaluation now, tried; /* of the accepted parameters, and of a step from there */
+    ov_buffer moments, gram;
+    ov_quadric *quadrics;
+    double *trial, *step;
+    size_t capacity;
+    float *host;
+    size_t host_capacity;
+    uint64_t list_builds, evaluations, steps;
+} ov_refiner;
+
+/* Changes the parameters x (OV_FACTOR_PARAMETERS per ellipsoid) to fit the target better; *misfit
+ * is sum_k weight_k r_k^2 at the end. OVOID_ERROR_CANCELLED when go_on says so. */
+ovoid_status ov_refine(ov_refiner *refiner, const ov_target *target,
+                       const ov_refine_options *options, double *x, size_t count, double *misfit);
+
+/* The misfit at x; the model's values at the points stay in refiner->now. */
+ovoid_status ov_refine_evaluate(ov_refiner *refiner, const ov_target *target, const double *x,
+                                size_t count, double *misfit);
+void ov_refiner_destroy(ov_refiner *refiner);
+
+#endif

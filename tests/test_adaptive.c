@@ -1,0 +1,593 @@
+/*
+ * The adaptive method from outside, by ovoid_fit(): its goals, odd molecules, what is independent
+ * of the device, and stops. Models are measured by ovoid_measure(), which knows nothing of fits.
+ */
+#include "ovoid/surface.h"
+#include "support.h"
+
+#define PI 3.14159265358979323846
+
+/* ---- molecules and fits ------------------------------------------------------------------- */
+
+static ovoid_molecule *molecule_of(ovoid_context *context, const double *xyzr, size_t atoms) {
+    ovoid_molecule *molecule = NULL;
+    test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
+    return molecule;
+}
+
+/* A random walk of 1.5 angstrom a step that drifts along x. */
+static ovoid_molecule *random_chain(ovoid_context *context, size_t atoms, uint64_t seed) {
+    test_random random = {seed};
+    double *const xyzr = test_alloc(4 * atoms, sizeof *xyzr);
+    double at[3] = {0.0, 0.0, 0.0};
+    for (size_t i = 0; i < atoms; ++i) {
+        double step[3] = {0.8 + random_uniform(&random, -1.0, 1.0),
+                          random_uniform(&random, -1.0, 1.0), random_uniform(&random, -1.0, 1.0)};
+        const double length = sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2]);
+        for (size_t k = 0; k < 3; ++k)
+            xyzr[4 * i + k] = at[k] += 1.5 * step[k] / length;
+        xyzr[4 * i + 3] = random_uniform(&random, 1.2, 1.9);
+    }
+    ovoid_molecule *const molecule = molecule_of(context, xyzr, atoms);
+    free(xyzr);
+    return molecule;
+}
+
+static ovoid_fit_options options_of(ovoid_goal goal, double value) {
+    ovoid_fit_options options;
+    ovoid_fit_options_init(&options);
+    options.adaptive.goal = goal;
+    if (goal == OVOID_GOAL_ELLIPSOIDS)
+        options.adaptive.ellipsoids = (uint32_t)value;
+    else if (goal == OVOID_GOAL_RATIO)
+        options.adaptive.ratio = value;
+    else
+        options.adaptive.tolerance = value;
+    if (test_small()) {
+        options.spacing = 1.2;
+        options.adaptive.mesh_spacing = 1.0;
+        options.adaptive.steps = 6;
+    }
+    return options;
+}
+
+/* Minutes for what takes a device a second. */
+static bool simulated(ovoid_context *context) {
+    return strstr(ovoid_context_device(context)->platform, "Oclgrind") != NULL;
+}
+
+/* A fit, and what is measured of it where both have a surface: `distance` of the result says. */
+typedef struct outcome {
+    ovoid_model *model;
+    ovoid_fit_result result;
+    ovoid_measures measures;
+} outcome;
+
+static void measure(ovoid_context *context, const ovoid_molecule *molecule,
+                    const ovoid_fit_options *options, outcome *o) {
+    ovoid_measure_options measuring;
+    ovoid_measure_options_init(&measuring);
+    measuring.isovalue = options->isovalue;
+    measuring.spacing = options->adaptive.mesh_spacing;
+    test_check(context, ovoid_measure(context, molecule, o->model, &measuring, &o->measures));
+    /* The file's nine digits apart, what the fit says is what anybody measures. */
+    expect_near(o->result.distance, o->measures.deviation, 1e-4, "the distance");
+}
+
+static outcome fit(ovoid_context *context, const ovoid_molecule *molecule,
+                   const ovoid_fit_options *options) {
+    outcome o = {0};
+    memset(&o.result, 0xff, sizeof o.result);
+    test_check(context, ovoid_fit(context, molecule, options, &o.model, &o.result));
+    const size_t count = ovoid_model_size(o.model);
+    assert_int_equal(count, o.result.ellipsoids);
+    assert_in_range(count, 1, ovoid_molecule_atoms(molecule));
+    assert_true(ovoid_model_decay(o.model) == options->decay);
+    assert_true(ovoid_model_isovalue(o.model) == options->isovalue);
+    assert_true(o.result.points > 0 && o.result.sample_seconds > 0.0 && o.result.fit_seconds > 0.0);
+    assert_true(o.result.spacing > 0.0);
+    assert_true(options->spacing == 0.0 || o.result.spacing == options->spacing);
+    assert_true(options->adaptive.steps > 0 || o.result.iterations == 0);
+    if (!isnan(o.result.distance))
+        measure(context, molecule, options, &o);
+    if (options->adaptive.goal == OVOID_GOAL_TOLERANCE && !isnan(o.result.distance))
+        assert_true(o.result.reached == (o.result.distance <= options->adaptive.tolerance));
+    return o;
+}
+
+static void expect_pair(const ovoid_pair *pair, double wanted, double share_original,
+                        double share_model, const char *what) {
+    print_message("%s: %.6g, of the model %.6g, %.6g expected\n", what, pair->original,
+                  pair->sparse, wanted);
+    expect_near(pair->original / wanted, 1.0, share_original, what);
+    expect_near(pair->sparse / wanted, 1.0, share_model, what);
+}
+
+/* ---- goals -------------------------------------------------------------------------------- */
+
+static void numbers_of_ellipsoids(void **state) {
+    if (simulated(*state))
+        skip();
+    const size_t atoms = test_size(24, 4);
+    ovoid_molecule *molecule = random_chain(*state, atoms, 1);
+    const size_t numbers[] = {1, 2, 7, atoms};
+    double before = INFINITY;
+    for (size_t n = 0; n < 4; ++n) {
+        if (numbers[n] > atoms)
+            continue;
+        const ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, (double)numbers[n]);
+        outcome o = fit(*state, molecule, &options);
+        print_message("%zu of %zu: %.3g apart, volume off by %.2g, area by %.2g\n", numbers[n],
+                      atoms, o.result.distance, o.measures.volume.error, o.measures.area.error);
+        assert_int_equal(o.result.ellipsoids, numbers[n]);
+        assert_true(o.result.reached);
+        assert_true(o.result.distance < before);
+        assert_true(o.measures.volume.error < 1e-3);
+        before = o.result.distance;
+        ovoid_model_destroy(&o.model);
+    }
+    assert_true(before < 1e-3); /* the atoms themselves */
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void ratios(void **state) {
+    if (simulated(*state))
+        skip();
+    const size_t atoms = test_size(24, 4);
+    ovoid_molecule *molecule = random_chain(*state, atoms, 2);
+    const struct {
+        double ratio;
+        size_t count;
+    } cases[] = {{0.25, atoms / 4}, {1e-9, 1}, {1.0, atoms}};
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; ++n) {
+        const ovoid_fit_options options = options_of(OVOID_GOAL_RATIO, cases[n].ratio);
+        outcome o = fit(*state, molecule, &options);
+        assert_int_equal(o.result.ellipsoids, cases[n].count);
+        assert_true(o.result.reached);
+        ovoid_model_destroy(&o.model);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Reached, and what is reached is measured, with fewer ellipsoids where it is less. */
+static void tolerances(void **state) {
+    if (simulated(*state))
+        skip();
+    const size_t atoms = test_size(40, 4);
+    ovoid_molecule *molecule = random_chain(*state, atoms, 3);
+    const double values[] = {2.0, 0.8, 0.4, 0.2};
+    const size_t most[] = {atoms / 4, atoms / 4, atoms / 2, atoms - 1};
+    for (size_t n = test_small() ? 2 : 0; n < test_size(4, 3); ++n) {
+        const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, values[n]);
+        outcome o = fit(*state, molecule, &options);
+        print_message("within %g: %zu of %zu, %.3g reached\n", values[n],
+                      (size_t)o.result.ellipsoids, atoms, o.result.distance);
+        assert_true(o.result.reached);
+        assert_true(o.measures.deviation <= values[n] + 1e-6);
+        assert_true(o.result.ellipsoids <= most[n] || test_small());
+        ovoid_model_destroy(&o.model);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Tighter than any merge allows: in the end the atoms themselves. Without a step of refinement a
+ * tolerance may be missed, and the result says so. */
+static void tolerances_out_of_reach(void **state) {
+    if (simulated(*state))
+        skip();
+    const size_t atoms = test_size(12, 4);
+    ovoid_molecule *molecule = random_chain(*state, atoms, 4);
+    ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 1e-3);
+    outcome o = fit(*state, molecule, &options);
+    assert_true(o.result.reached);
+    assert_int_equal(o.result.ellipsoids, atoms);
+    ovoid_model_destroy(&o.model);
+    options = options_of(OVOID_GOAL_TOLERANCE, test_small() ? 0.05 : 0.15);
+    options.adaptive.steps = 0;
+    o = fit(*state, molecule, &options);
+    print_message("unrefined: %zu of %zu, %.3g\n", (size_t)o.result.ellipsoids, atoms,
+                  o.result.distance);
+    assert_int_equal(o.result.solver_iterations, 0);
+    assert_true(!o.result.reached || o.result.ellipsoids == atoms);
+    ovoid_model_destroy(&o.model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Everything once, refinement, merging and judging included, at sizes for simulators. */
+static void two_atoms_as_one(void **state) {
+    const double xyzr[8] = {0.0, 0.0, 0.0, 1.5, 1.1, 0.2, 0.0, 1.3};
+    ovoid_molecule *molecule = molecule_of(*state, xyzr, 2);
+    ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, 1);
+    if (test_small())
+        options.adaptive.steps = 2;
+    outcome o = fit(*state, molecule, &options);
+    print_message("%.3g apart\n", o.result.distance);
+    assert_int_equal(o.result.ellipsoids, 1);
+    assert_true(o.result.distance < 0.2 && o.measures.volume.error < 1e-3);
+    ovoid_model_destroy(&o.model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- odd molecules ------------------------------------------------------------------------ */
+
+/* One sphere, whatever the goal: areas and volumes in closed form. */
+static void expect_sphere(ovoid_context *context, const ovoid_molecule *molecule,
+                          ovoid_fit_options options, size_t count, double radius) {
+    const double area = 4.0 * PI * radius * radius, volume = area * radius / 3.0;
+    const double share = test_small() ? 0.05 : 2e-3;
+    outcome o = fit(context, molecule, &options);
+    assert_int_equal(o.result.ellipsoids, count);
+    assert_true(o.result.reached);
+    expect_near(o.result.distance, 0.0, 1e-3, "the distance");
+    expect_pair(&o.measures.area, area, share, share, "area");
+    expect_pair(&o.measures.volume, volume, share, share, "volume");
+    ovoid_model_destroy(&o.model);
+}
+
+static void one_atom(void **state) {
+    const double xyzr[4] = {5.1, -6.2, 7.3, 1.7};
+    ovoid_molecule *molecule = molecule_of(*state, xyzr, 1);
+    expect_sphere(*state, molecule, options_of(OVOID_GOAL_ELLIPSOIDS, 1), 1, 1.7);
+    if (!simulated(*state)) {
+        expect_sphere(*state, molecule, options_of(OVOID_GOAL_RATIO, 0.01), 1, 1.7);
+        expect_sphere(*state, molecule, options_of(OVOID_GOAL_TOLERANCE, 0.5), 1, 1.7);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* The largest bead there may be: squares of its values are beyond floats. */
+static void one_large_bead(void **state) {
+    if (test_small()) /* many points */
+        skip();
+    const double xyzr[4] = {0.0, 0.0, 0.0, 12.6};
+    ovoid_molecule *molecule = molecule_of(*state, xyzr, 1);
+    expect_sphere(*state, molecule, options_of(OVOID_GOAL_TOLERANCE, 0.5), 1, 12.6);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* phi = 2 exp(-d (|x|^2 - r^2)): a sphere with r^2 + ln 2 / d. */
+static void coincident_atoms(void **state) {
+    if (simulated(*state))
+        skip();
+    const double xyzr[8] = {1.0, 1.0, 1.0, 1.5, 1.0, 1.0, 1.0, 1.5};
+    const double radius = sqrt(1.5 * 1.5 + 2.0 * log(2.0));
+    ovoid_molecule *molecule = molecule_of(*state, xyzr, 2);
+    expect_sphere(*state, molecule, options_of(OVOID_GOAL_ELLIPSOIDS, 1), 1, radius);
+    expect_sphere(*state, molecule, options_of(OVOID_GOAL_ELLIPSOIDS, 2), 2, radius);
+    expect_sphere(*state, molecule, options_of(OVOID_GOAL_TOLERANCE, 0.5), 1, radius);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Where the field nowhere reaches the isovalue, the model follows the field, and there is no
+ * distance; a goal that is about surfaces holds. */
+static void no_surface(void **state) {
+    if (simulated(*state))
+        skip();
+    const double bare[12] = {0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0};
+    ovoid_molecule *molecule = molecule_of(*state, bare, 3);
+    const ovoid_fit_options all[] = {options_of(OVOID_GOAL_TOLERANCE, 0.5),
+                                     options_of(OVOID_GOAL_ELLIPSOIDS, 3)};
+    for (size_t n = 0; n < 2; ++n) {
+        ovoid_fit_options options = all[n];
+        options.isovalue = 1.5;
+        outcome o = fit(*state, molecule, &options);
+        assert_true(isnan(o.result.distance) && o.result.reached);
+        ovoid_model_destroy(&o.model);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Atoms of radius 0 count: about one of radius r, phi grows. */
+static void atoms_of_radius_zero(void **state) {
+    if (simulated(*state))
+        skip();
+    const double xyzr[12] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    const double radius = sqrt(2.0 * log(exp(0.5 * 1.7 * 1.7) + 2.0));
+    ovoid_molecule *molecule = molecule_of(*state, xyzr, 3);
+    expect_sphere(*state, molecule, options_of(OVOID_GOAL_ELLIPSOIDS, 1), 1, radius);
+    expect_sphere(*state, molecule, options_of(OVOID_GOAL_TOLERANCE, 0.5), 1, radius);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* One ellipsoid cannot be in two places, two can. */
+static void pieces_far_apart(void **state) {
+    if (simulated(*state))
+        skip();
+    const double apart = test_small() ? 9.0 : 30.0;
+    const double xyzr[16] = {0.0,   0.0, 0.0, 1.7, 1.2,         0.5, 0.0, 1.5,
+                             apart, 0.0, 0.0, 1.6, apart + 0.3, 1.2, 0.4, 1.6};
+    ovoid_molecule *molecule = molecule_of(*state, xyzr, 4);
+    for (size_t count = 1; count <= 2; ++count) {
+        const ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, (double)count);
+        outcome o = fit(*state, molecule, &options);
+        print_message("%zu for two pieces: %.3g apart\n", count, o.result.distance);
+        assert_int_equal(o.result.ellipsoids, count);
+        if (count == 2)
+            assert_true(o.result.distance < (test_small() ? 0.6 : 0.2));
+        else
+            assert_true(isnan(o.result.distance) || o.result.distance > 1.0);
+        ovoid_model_destroy(&o.model);
+    }
+    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.6);
+    outcome o = fit(*state, molecule, &options);
+    assert_true(o.result.reached && o.result.ellipsoids >= 2);
+    ovoid_model_destroy(&o.model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- a surface of revolution -------------------------------------------------------------- */
+
+/* Atoms along z: phi(rho, z) = exp(-d rho^2) S(z), so the surface is rho^2 = ln(S(z) / c) / d. */
+typedef struct rod {
+    const double *xyzr;
+    size_t atoms;
+    double decay, isovalue;
+} rod;
+
+/* ln(S / c) / d, and its derivative. */
+static double rho_squared(const rod *r, double z, double *slope) {
+    double sum = 0.0, change = 0.0;
+    for (size_t i = 0; i < r->atoms; ++i) {
+        const double off = z - r->xyzr[4 * i + 2], radius = r->xyzr[4 * i + 3];
+        const double part = exp(-r->decay * (off * off - radius * radius));
+        sum += part;
+        change -= 2.0 * r->decay * off * part;
+    }
+    *slope = change / sum / r->decay;
+    return log(sum / r->isovalue) / r->decay;
+}
+
+/* pi int rho^2 dz, and 2 pi int sqrt(rho^2 + (rho rho')^2) dz with rho rho' = (rho^2)' / 2, both by
+ * the midpoint rule. */
+static void rod_content(const rod *r, double *area, double *volume) {
+    const double from = r->xyzr[2] - 6.0, to = r->xyzr[4 * (r->atoms - 1) + 2] + 6.0;
+    const int steps = 200000;
+    const double h = (to - from) / steps;
+    *area = *volume = 0.0;
+    for (int n = 0; n < steps; ++n) {
+        double slope;
+        const double square = rho_squared(r, from + (n + 0.5) * h, &slope);
+        if (square > 0.0) {
+            *volume += PI * square * h;
+            *area += 2.0 * PI * sqrt(square + 0.25 * slope * slope) * h;
+        }
+    }
+}
+
+/* The same numbers of ellipsoids, and areas and volumes within these bounds, on every device. */
+static void a_rod_equals_its_integral(void **state) {
+    if (simulated(*state))
+        skip();
+    enum { ROD_MAX = 8 };
+    double xyzr[4 * ROD_MAX] = {0};
+    const size_t atoms = test_size(ROD_MAX, 4);
+    for (size_t i = 0; i < atoms; ++i) {
+        xyzr[4 * i + 2] = 1.4 * (double)i;
+        xyzr[4 * i + 3] = i % 2 ? 1.5 : 1.8;
+    }
+    const struct { double decay, isovalue; } cases[] = {{0.5, 1.0}, {0.7, 1.3}, {0.3, 0.6}};
+    ovoid_molecule *molecule = molecule_of(*state, xyzr, atoms);
+    for (size_t n = 0; n < test_size(3, 1); ++n) {
+        const rod r = {xyzr, atoms, cases[n].decay, cases[n].isovalue};
+        double area, volume;
+        rod_content(&r, &area, &volume);
+        ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, (double)test_size(3, 2));
+        options.decay = r.decay;
+        options.isovalue = r.isovalue;
+        outcome o = fit(*state, molecule, &options);
+        assert_int_equal(o.result.ellipsoids, options.adaptive.ellipsoids);
+        print_message("%.3g apart\n", o.result.distance);
+        expect_pair(&o.measures.area, area, test_small() ? 0.03 : 1e-3, test_small() ? 0.05 : 0.02,
+                    "area");
+        expect_pair(&o.measures.volume, volume, test_small() ? 0.03 : 1e-3,
+                    test_small() ? 0.05 : 2e-3, "volume");
+        assert_true(o.result.distance < (test_small() ? 0.8 : 0.35));
+        ovoid_model_destroy(&o.model);
+        options.adaptive.goal = OVOID_GOAL_TOLERANCE;
+        options.adaptive.tolerance = 0.6;
+        o = fit(*state, molecule, &options);
+        print_message("%zu within %g\n", (size_t)o.result.ellipsoids, options.adaptive.tolerance);
+        assert_true(o.result.reached);
+        assert_in_range(o.result.ellipsoids, 1, 3);
+        ovoid_model_destroy(&o.model);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- effort ------------------------------------------------------------------------------- */
+
+static double score(const ovoid_measures *m) {
+    return m->deviation + 10.0 * m->area.error;
+}
+
+static void effort_helps(void **state) {
+    if (simulated(*state))
+        skip();
+    const size_t atoms = test_size(30, 4);
+    ovoid_molecule *molecule = random_chain(*state, atoms, 5);
+    double scores[2];
+    for (uint32_t effort = 1; effort <= 2; ++effort) {
+        ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, (double)test_size(5, 2));
+        options.adaptive.effort = effort;
+        outcome o = fit(*state, molecule, &options);
+        assert_int_equal(o.result.ellipsoids, options.adaptive.ellipsoids);
+        scores[effort - 1] = score(&o.measures);
+        ovoid_model_destroy(&o.model);
+        options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+        options.adaptive.effort = effort;
+        o = fit(*state, molecule, &options);
+        assert_true(o.result.reached);
+        ovoid_model_destroy(&o.model);
+    }
+    print_message("scores %.3g, %.3g\n", scores[0], scores[1]);
+    assert_true(scores[1] < scores[0] + 1e-3);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- the same bits ------------------------------------------------------------------------ */
+
+static void two_fits_give_the_same_bits(void **state) {
+    if (simulated(*state))
+        skip();
+    ovoid_molecule *molecule = random_chain(*state, test_size(40, 4), 6);
+    ovoid_fit_options all[] = {options_of(OVOID_GOAL_TOLERANCE, 0.4),
+                               options_of(OVOID_GOAL_ELLIPSOIDS, (double)test_size(6, 2))};
+    all[1].adaptive.effort = (uint32_t)test_size(2, 1);
+    for (size_t kind = 0; kind < test_size(2, 1); ++kind) {
+        ovoid_model *models[3] = {0};
+        for (int n = 0; n < 3; ++n) {
+            ovoid_context *other = NULL;
+            if (n == 2) { /* a fresh context, the device opened by the fit */
+                assert_int_equal(ovoid_context_create(&other), OVOID_OK);
+                test_check(other, ovoid_fit(other, molecule, &all[kind], &models[n], NULL));
+                ovoid_context_destroy(&other);
+            } else {
+                test_check(*state, ovoid_fit(*state, molecule, &all[kind], &models[n], NULL));
+            }
+            assert_int_equal(ovoid_model_size(models[n]), ovoid_model_size(models[0]));
+            assert_memory_equal(ovoid_model_ellipsoids(models[n]),
+                                ovoid_model_ellipsoids(models[0]),
+                                ovoid_model_size(models[0]) * sizeof(ovoid_ellipsoid));
+        }
+        for (int n = 0; n < 3; ++n)
+            ovoid_model_destroy(&models[n]);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- stopping ----------------------------------------------------------------------------- */
+
+typedef struct stop {
+    const char *stage; /* stops at the `count`-th call of this stage */
+    unsigned count;
+    double seconds;
+    uint64_t iteration;
+    bool stopped;
+} stop;
+
+static bool stop_there(const ovoid_progress *progress, void *user) {
+    stop *const s = user;
+    assert_false(s->stopped); /* nobody is asked again */
+    assert_true(progress->seconds >= s->seconds && progress->iteration >= s->iteration);
+    assert_true(progress->ellipsoids > 0);
+    s->seconds = progress->seconds;
+    s->iteration = progress->iteration;
+    if (strcmp(progress->stage, s->stage) == 0 && --s->count == 0)
+        s->stopped = true;
+    return !s->stopped;
+}
+
+static void a_stopped_fit_hands_over_nothing(void **state) {
+    if (simulated(*state))
+        skip();
+    ovoid_molecule *molecule = random_chain(*state, test_size(30, 4), 7);
+    const struct {
+        const char *stage;
+        unsigned count;
+        ovoid_goal goal;
+    } cases[] = {{"sample", 1, OVOID_GOAL_TOLERANCE},  {"merge", 1, OVOID_GOAL_ELLIPSOIDS},
+                 {"refine", 1, OVOID_GOAL_ELLIPSOIDS}, {"refine", 4, OVOID_GOAL_TOLERANCE},
+                 {"shrink", 1, OVOID_GOAL_TOLERANCE},  {"merge", 2, OVOID_GOAL_ELLIPSOIDS},
+                 {"grow", 2, OVOID_GOAL_TOLERANCE},    {"repair", 1, OVOID_GOAL_ELLIPSOIDS},
+                 {"repair", 9, OVOID_GOAL_ELLIPSOIDS}};
+    for (size_t n = 0; n < test_size(sizeof cases / sizeof *cases, 4); ++n) {
+        stop s = {.stage = cases[n].stage, .count = cases[n].count};
+        ovoid_fit_options options = options_of(
+            cases[n].goal, cases[n].goal == OVOID_GOAL_TOLERANCE ? 0.3 : (double)test_size(4, 2));
+        ovoid_fit_result result, untouched;
+        ovoid_model *const nothing = (ovoid_model *)&s, *model = nothing;
+        memset(&untouched, 0x5a, sizeof untouched);
+        result = untouched;
+        options.adaptive.effort = 2;
+        options.progress = stop_there;
+        options.user = &s;
+        print_message("stopped at %s %u\n", cases[n].stage, cases[n].count);
+        test_refused(*state, ovoid_fit(*state, molecule, &options, &model, &result),
+                     OVOID_ERROR_CANCELLED, "stopped");
+        assert_ptr_equal(model, nothing);
+        assert_memory_equal(&result, &untouched, sizeof result);
+    }
+    ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, 2); /* fit for the next one */
+    outcome o = fit(*state, molecule, &options);
+    ovoid_model_destroy(&o.model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- refusals ----------------------------------------------------------------------------- */
+
+static void expect_refusal(ovoid_context *context, const ovoid_molecule *molecule,
+                           const ovoid_fit_options *options, ovoid_status status,
+                           const char *text) {
+    ovoid_model *model = NULL;
+    ovoid_fit_result result, untouched;
+    memset(&untouched, 0x5a, sizeof untouched);
+    result = untouched;
+    test_refused(context, ovoid_fit(context, molecule, options, &model, &result), status, text);
+    assert_null(model);
+    assert_memory_equal(&result, &untouched, sizeof result);
+}
+
+static void bad_options_are_named(void **state) {
+    const double values[] = {NAN, -1.0, 0.0, INFINITY};
+    ovoid_molecule *molecule = random_chain(*state, 3, 8);
+    ovoid_fit_options o;
+    for (size_t n = 0; n < sizeof values / sizeof *values; ++n) {
+        o = options_of(OVOID_GOAL_TOLERANCE, values[n]);
+        expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "tolerance");
+        o = options_of(OVOID_GOAL_RATIO, values[n]);
+        expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "ratio");
+        o = options_of(OVOID_GOAL_TOLERANCE, 1.0);
+        o.adaptive.mesh_spacing = values[n];
+        expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "mesh_spacing");
+    }
+    o = options_of(OVOID_GOAL_RATIO, 1.001);
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "ratio");
+    o = options_of(OVOID_GOAL_ELLIPSOIDS, 0);
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "at least one ellipsoid");
+    o = options_of(OVOID_GOAL_ELLIPSOIDS, 4);
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT,
+                   "4 ellipsoids are asked for, and there are only 3 atoms");
+    o = options_of(OVOID_GOAL_TOLERANCE, 1.0);
+    o.adaptive.effort = 0;
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "effort");
+    o.adaptive.effort = 11;
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "effort");
+    o = options_of((ovoid_goal)7, 1.0);
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "unknown goal");
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void impossible_molecules(void **state) {
+    const double bead[4] = {0.0, 0.0, 0.0, 20.0};
+    const double apart[8] = {-1e5, -1e5, -1e5, 1.7, 1e5, 1e5, 1e5, 1.7};
+    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+    ovoid_molecule *molecule = molecule_of(*state, bead, 1);
+    expect_refusal(*state, molecule, &options, OVOID_ERROR_LIMIT, "radius");
+    ovoid_molecule_destroy(&molecule);
+    molecule = molecule_of(*state, apart, 2);
+    expect_refusal(*state, molecule, &options, OVOID_ERROR_LIMIT, "spacing");
+    ovoid_molecule_destroy(&molecule);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(numbers_of_ellipsoids),
+        cmocka_unit_test(ratios),
+        cmocka_unit_test(tolerances),
+        cmocka_unit_test(tolerances_out_of_reach),
+        cmocka_unit_test(two_atoms_as_one),
+        cmocka_unit_test(one_atom),
+        cmocka_unit_test(one_large_bead),
+        cmocka_unit_test(coincident_atoms),
+        cmocka_unit_test(no_surface),
+        cmocka_unit_test(atoms_of_radius_zero),
+        cmocka_unit_test(pieces_far_apart),
+        cmocka_unit_test(a_rod_equals_its_integral),
+        cmocka_unit_test(effort_helps),
+        cmocka_unit_test(two_fits_give_the_same_bits),
+        cmocka_unit_test(a_stopped_fit_hands_over_nothing),
+        cmocka_unit_test(bad_options_are_named),
+        cmocka_unit_test(impossible_molecules),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -1,0 +1,269 @@
+/*
+ * Judging models by their surfaces: spheres, whose areas, volumes and distances are known.
+ */
+#include "fit/judge.h"
+#include "support.h"
+
+#define PI 3.14159265358979323846
+
+static ov_quadric *quadrics_of(const double *xyzr, size_t atoms, double decay) {
+    ov_quadric *const quadrics = test_alloc(atoms, sizeof *quadrics);
+    for (size_t i = 0; i < atoms; ++i)
+        ov_quadric_of_atom(xyzr + 4 * i, decay, &quadrics[i]);
+    return quadrics;
+}
+
+/* Too far apart to know of one another. */
+static const double two[8] = {1.0, 2.0, 3.0, 1.7, 11.0, 2.0, 3.0, 1.4};
+
+static double spacing(void) {
+    return test_small() ? 0.9 : 0.35;
+}
+
+static void judge_atoms(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                        double isovalue, ov_judge *judge) {
+    memset(judge, 0, sizeof *judge);
+    test_check(context, ov_judge_create(context, xyzr, atoms, decay, isovalue, spacing(), judge));
+}
+
+static ov_judgement judgement_of(ovoid_context *context, ov_judge *judge,
+                                 const ov_quadric *quadrics, size_t count) {
+    ov_judgement judgement;
+    test_check(context, ov_judge_model(judge, quadrics, count, &judgement));
+    return judgement;
+}
+
+static void expect_invalid(const ov_judgement *judgement) {
+    assert_false(judgement->valid);
+    assert_true(judgement->deviation == INFINITY && judgement->hausdorff == INFINITY &&
+                judgement->score == INFINITY);
+}
+
+/* ---- judgements --------------------------------------------------------------------------- */
+
+static void the_same_is_the_same(void **state) {
+    const double xyzr[] = {0, 0, 0, 1.7, 1.5, 0.3, 0, 1.5, 0.2, 1.4, -0.5, 1.2, 8, 0, 0, 1.2};
+    const double decays[] = {0.5, 0.5, 0.9}, isovalues[] = {1.0, 0.6, 1.3};
+    for (size_t n = 0; n < test_size(3, 1); ++n) {
+        ov_judge judge;
+        judge_atoms(*state, xyzr, 4, decays[n], isovalues[n], &judge);
+        ov_quadric *const quadrics = quadrics_of(xyzr, 4, decays[n]);
+        const ov_judgement got = judgement_of(*state, &judge, quadrics, 4);
+        assert_true(got.valid);
+        expect_near(got.deviation, 0.0, 1e-4, "deviation");
+        expect_near(got.hausdorff, 0.0, 1e-4, "hausdorff");
+        expect_near(got.area_error, 0.0, 1e-6, "area");
+        expect_near(got.volume_ratio, 1.0, 1e-6, "volume");
+        expect_near(got.score, 0.0, 1e-4, "score");
+        double ratio = NAN;
+        test_check(*state, ov_judge_volume(&judge, quadrics, 4, &ratio));
+        assert_true(ratio == got.volume_ratio);
+        free(quadrics);
+        ov_judge_destroy(&judge);
+    }
+}
+
+/* One of two spheres left out: its far side is furthest from what is left. */
+static void a_missing_piece(void **state) {
+    ov_judge judge;
+    judge_atoms(*state, two, 2, 0.5, 1.0, &judge);
+    ov_quadric *const quadrics = quadrics_of(two, 2, 0.5);
+    const double r = two[3], s = two[7];
+    const double far = 10.0 + s - r, volume = r * r * r / (r * r * r + s * s * s),
+                 area = s * s / (r * r + s * s);
+    const ov_judgement got = judgement_of(*state, &judge, quadrics, 1);
+    assert_true(got.valid);
+    expect_near(got.deviation, far, test_size(2, 8) * 0.01, "deviation");
+    expect_near(got.hausdorff, got.deviation, 0.0, "hausdorff");
+    expect_near(got.volume_ratio, volume, test_size(1, 30) * 1e-3, "volume");
+    expect_near(got.area_error, area, test_size(1, 30) * 1e-3, "area");
+    expect_near(got.score, got.deviation + 10.0 * got.area_error, 1e-9, "score");
+
+    ov_spot *spots = NULL;
+    size_t count = 0;
+    ov_judgement again;
+    test_check(*state, ov_judge_spots(&judge, quadrics, 1, 5.0, 1.0, 3, &again, &spots, &count));
+    assert_memory_equal(&again, &got, sizeof got);
+    assert_int_equal(count, 3);
+    expect_near(spots[0].distance, got.deviation, 0.0, "the first spot's distance");
+    const double place[3] = {11.0 + s, 2.0, 3.0};
+    for (int k = 0; k < 3; ++k)
+        expect_near(spots[0].at[k], place[k], test_small() ? 0.5 : 0.25, "the first spot");
+    free(spots);
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
+static double distance(const double a[3], const double b[3]) {
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* One of two spheres grown: all around it, and nowhere else. */
+static void a_grown_piece(void **state) {
+    const double growth = 0.3, r = two[3], s = two[7];
+    double grown[8];
+    memcpy(grown, two, sizeof grown);
+    grown[7] += growth;
+    ov_judge judge;
+    judge_atoms(*state, two, 2, 0.5, 1.0, &judge);
+    ov_quadric *const quadrics = quadrics_of(grown, 2, 0.5);
+    ov_spot *spots = NULL;
+    size_t count = 0;
+    ov_judgement got;
+    const double apart = 1.0;
+    test_check(*state, ov_judge_spots(&judge, quadrics, 2, 0.2, apart, 100, &got, &spots, &count));
+    assert_true(got.valid);
+    /* Triangles are flat: the outer one's vertices are further away from those of the inner one. */
+    assert_true(got.deviation > growth - 1e-3);
+    expect_near(got.deviation, growth, 0.3 * spacing() * spacing(), "deviation");
+    expect_near(got.volume_ratio, (r * r * r + pow(s + growth, 3.0)) / (r * r * r + s * s * s),
+                test_size(1, 20) * 1e-3, "volume");
+    expect_near(got.area_error, ((s + growth) * (s + growth) - s * s) / (r * r + s * s),
+                test_size(1, 20) * 1e-3, "area");
+    print_message("%zu spots\n", count);
+    assert_true(count >= 6 && count < 100);
+    bool of_model = false; /* those of the original alone are in a_missing_piece() */
+    for (size_t n = 0; n < count; ++n) {
+        const double from = distance(spots[n].at, two + 4);
+        assert_true(spots[n].distance >= 0.2 && spots[n].distance <= got.deviation);
+        assert_true(n == 0 || spots[n].distance <= spots[n - 1].distance);
+        assert_true(fabs(from - s) < 1e-3 || fabs(from - s - growth) < 1e-3);
+        of_model = of_model || from > s + 0.5 * growth;
+        for (size_t m = 0; m < n; ++m)
+            assert_true(distance(spots[n].at, spots[m].at) >= apart);
+    }
+    assert_true(of_model);
+    free(spots);
+    test_check(*state, ov_judge_spots(&judge, quadrics, 2, 0.5, apart, 100, &got, &spots, &count));
+    assert_int_equal(count, 0); /* nothing is that far */
+    free(spots);
+    test_check(*state, ov_judge_spots(&judge, quadrics, 2, 0.1, 0.0, 7, &got, &spots, &count));
+    assert_int_equal(count, 7);
+    free(spots);
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
+/* A cavity that the model fills: the outer surface is as it was, the whole one is not. */
+static void a_filled_cavity(void **state) {
+    if (test_small()) /* a shell takes many atoms */
+        skip();
+    enum { SHELL = 60 };
+    double xyzr[4 * (SHELL + 1)] = {0};
+    for (size_t i = 0; i < SHELL; ++i) {
+        const double z = 1.0 - (2.0 * (double)i + 1.0) / SHELL, turn = 2.399963 * (double)i;
+        const double rho = 4.5 * sqrt(1.0 - z * z);
+        const double at[4] = {rho * cos(turn), rho * sin(turn), 4.5 * z, 1.5};
+        memcpy(xyzr + 4 * i, at, sizeof at);
+    }
+    xyzr[4 * SHELL + 3] = 2.4; /* the filling, at the origin */
+    ov_judge judge;
+    judge_atoms(*state, xyzr, SHELL, 0.5, 1.0, &judge);
+    ov_quadric *const quadrics = quadrics_of(xyzr, SHELL + 1, 0.5);
+    const ov_judgement got = judgement_of(*state, &judge, quadrics, SHELL + 1);
+    print_message("deviation %g, hausdorff %g, volumes %g\n", got.deviation, got.hausdorff,
+                  got.volume_ratio);
+    assert_true(got.valid);
+    expect_near(got.deviation, 0.0, 0.01, "deviation");
+    assert_true(got.hausdorff > 1.0);
+    assert_true(got.volume_ratio > 1.02);
+    expect_near(got.score,
+                got.deviation + 0.3 * (got.hausdorff - got.deviation) + 10.0 * got.area_error, 1e-9,
+                "score");
+    ov_spot *spots = NULL;
+    size_t count = 1;
+    ov_judgement again;
+    test_check(*state,
+               ov_judge_spots(&judge, quadrics, SHELL + 1, 0.5, 1.0, 9, &again, &spots, &count));
+    assert_int_equal(count, 0); /* spots are of outer surfaces */
+    free(spots);
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
+/* ---- no surfaces -------------------------------------------------------------------------- */
+
+static void no_surface_of_the_original(void **state) {
+    ov_judge judge;
+    judge_atoms(*state, two, 2, 0.5, 100.0, &judge); /* phi is at most exp(1.445) */
+    assert_null(judge.mesh);
+    ov_quadric *const quadrics = quadrics_of(two, 2, 0.5);
+    for (int n = 0; n < 2; ++n) {
+        ov_spot *spots = NULL;
+        size_t count = 5;
+        ov_judgement got;
+        double ratio = NAN;
+        quadrics[0].amplitude *= n == 0 ? 1.0 : 1000.0; /* the model has none, then one */
+        test_check(*state, ov_judge_spots(&judge, quadrics, 2, 0.0, 1.0, 9, &got, &spots, &count));
+        expect_invalid(&got);
+        assert_int_equal(count, 0);
+        free(spots);
+        test_check(*state, ov_judge_volume(&judge, quadrics, 2, &ratio));
+        assert_true(ratio == 1.0);
+        assert_true(ov_judge_amplitude_factor(&judge, 0.5) == 1.0);
+    }
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
+static void no_surface_of_the_model(void **state) {
+    ov_judge judge;
+    judge_atoms(*state, two, 2, 0.5, 1.0, &judge);
+    ov_quadric *const quadrics = quadrics_of(two, 2, 0.5);
+    quadrics[0].amplitude = quadrics[1].amplitude = 0.5;
+    const ov_judgement got = judgement_of(*state, &judge, quadrics, 2);
+    expect_invalid(&got);
+    double ratio = NAN;
+    test_check(*state, ov_judge_volume(&judge, quadrics, 2, &ratio));
+    assert_true(ratio == 1.0);
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
+/* ---- volumes ------------------------------------------------------------------------------ */
+
+/* Spheres too small or too large by 5 % in volume become equal in three steps, and no factor is
+ * large, whatever the ratio. */
+static void factors_make_volumes_equal(void **state) {
+    const double decays[] = {0.5, 1.5}, isovalues[] = {1.0, 1.4};
+    for (size_t n = 0; n < test_size(4, 1); ++n) {
+        const double d = decays[n / 2], c = isovalues[n / 2];
+        const double radius = 1.7 * sqrt(0.5 / d);
+        double xyzr[4] = {0.3, -0.2, 0.1, radius};
+        ov_judge judge;
+        judge_atoms(*state, xyzr, 1, d, c, &judge);
+        xyzr[3] =
+            sqrt(log(c) / d + (radius * radius - log(c) / d) * pow(n % 2 ? 1.05 : 0.95, 2.0 / 3.0));
+        ov_quadric *const quadric = quadrics_of(xyzr, 1, d);
+        double ratio = NAN;
+        test_check(*state, ov_judge_volume(&judge, quadric, 1, &ratio));
+        expect_near(ratio, n % 2 ? 1.05 : 0.95, 0.01, "the volume at first");
+        for (int step = 0; step < 3; ++step) {
+            const double factor = ov_judge_amplitude_factor(&judge, ratio);
+            assert_true((factor > 1.0) == (ratio < 1.0));
+            quadric->amplitude *= factor;
+            test_check(*state, ov_judge_volume(&judge, quadric, 1, &ratio));
+        }
+        print_message("volumes %.6f\n", ratio);
+        expect_near(ratio, 1.0, 2e-3, "the volume at last");
+        expect_near(ov_judge_amplitude_factor(&judge, 0.01), 1.1, 1e-12, "the largest factor");
+        expect_near(ov_judge_amplitude_factor(&judge, 100.0), 1.0 / 1.1, 1e-12, "the least factor");
+        expect_near(ov_judge_amplitude_factor(&judge, 1.0), 1.0, 0.0, "no factor");
+        free(quadric);
+        ov_judge_destroy(&judge);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_same_is_the_same),
+        cmocka_unit_test(a_missing_piece),
+        cmocka_unit_test(a_grown_piece),
+        cmocka_unit_test(a_filled_cavity),
+        cmocka_unit_test(no_surface_of_the_original),
+        cmocka_unit_test(no_surface_of_the_model),
+        cmocka_unit_test(factors_make_volumes_equal),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -1,0 +1,472 @@
+/*
+ * The solver of the adaptive fit: the maps between parameters and polynomials, the blocks of the
+ * preconditioner, and whole solutions against a dense system in double.
+ */
+#include "fit/solver.h"
+#include "reference/factor.h"
+#include "support.h"
+
+enum { P = OV_FACTOR_PARAMETERS, BLOCK = P * (P + 1) / 2 };
+
+/* ---- the twin itself ---------------------------------------------------------------------- */
+
+static void random_factor(test_random *random, double half, double x[P]) {
+    ovoid_ellipsoid ellipsoid;
+    ov_quadric quadric;
+    random_ellipsoids(random, MODEL_RANDOM, half, &ellipsoid, 1);
+    ov_quadric_of_ellipsoid(&ellipsoid, &quadric);
+    ov_factor_of_quadric(&quadric, x);
+}
+
+/* Central differences of the ellipsoid's own formula, extrapolated to fourth order, in all ten
+ * parameters. */
+static void twin_is_the_derivative(void **state) {
+    (void)state;
+    test_random random = {1};
+    for (int n = 0; n < 100; ++n) {
+        double x[P], y[3], row[P];
+        random_factor(&random, 1.0, x);
+        for (int k = OV_FACTOR_L; n % 2 && k < P; ++k)
+            x[k] = random_uniform(&random, -1.0, 1.0);
+        for (int k = 0; k < 3; ++k)
+            y[k] = random_uniform(&random, -1.5, 1.5);
+        reference_jacobian(x, 1, y, row);
+        const double value = reference_factor_value(x, y);
+        for (int j = 0; j < P; ++j) {
+            double slope[2];
+            for (int half = 0; half < 2; ++half) {
+                const double h = half ? 1e-3 : 2e-3;
+                double up[P], down[P];
+                memcpy(up, x, sizeof up);
+                memcpy(down, x, sizeof down);
+                up[j] += h;
+                down[j] -= h;
+                slope[half] =
+                    (reference_factor_value(up, y) - reference_factor_value(down, y)) / (2.0 * h);
+            }
+            expect_near(row[j], (4.0 * slope[1] - slope[0]) / 3.0, 1e-7 * (1.0 + 10.0 * value),
+                        "a derivative");
+        }
+    }
+}
+
+/* ---- solve_start -------------------------------------------------------------------------- */
+
+/* What solve_start takes and leaves, `count` ellipsoids. */
+typedef struct start {
+    size_t count;
+    double *x;             /* parameters */
+    float *gram, *moments; /* given */
+    float *block, *diagonal, *step, *r, *p, *polynomial, *rz;
+} start;
+
+static void run_start(ovoid_context *context, start *s, float lambda) {
+    ov_kernel kernel = {0};
+    ov_buffer factor = {0}, gram = {0}, moments = {0}, block = {0}, diagonal = {0}, x = {0},
+              r = {0}, p = {0}, polynomial = {0}, rz = {0};
+    const cl_uint count = (cl_uint)s->count;
+    const size_t groups = (s->count + OV_SOLVE_GROUP - 1) / OV_SOLVE_GROUP;
+    float *const l = test_alloc(6 * s->count, sizeof *l);
+    for (size_t i = 0; i < s->count; ++i)
+        for (size_t k = 0; k < 6; ++k)
+            l[6 * i + k] = (float)s->x[i * P + OV_FACTOR_L + k];
+    test_check(context, ov_kernel_create(context, "solve", "solve_start", &kernel));
+    write_floats(context, &factor, l, 6 * s->count);
+    write_floats(context, &gram, s->gram, OV_GRAM * s->count);
+    write_floats(context, &moments, s->moments, 2 * OV_MONOMIALS * s->count);
+    ov_buffer *const vectors[] = {&diagonal, &x, &r, &p, &polynomial};
+    for (size_t k = 0; k < sizeof vectors / sizeof *vectors; ++k)
+        test_check(context, ov_buffer_reserve(context, vectors[k], s->count * P * 4, "vector"));
+    test_check(context, ov_buffer_reserve(context, &block, s->count * BLOCK * 4, "blocks"));
+    test_check(context, ov_buffer_reserve(context, &rz, groups * 4, "sums"));
+    test_check(context, OV_LAUNCH(context, &kernel, count, OV_SOLVE_GROUP, OV_ARG(count),
+                                  OV_ARG(lambda), OV_ARG(factor.memory), OV_ARG(gram.memory),
+                                  OV_ARG(moments.memory), OV_ARG(block.memory),
+                                  OV_ARG(diagonal.memory), OV_ARG(x.memory), OV_ARG(r.memory),
+                                  OV_ARG(p.memory), OV_ARG(polynomial.memory), OV_ARG(rz.memory)));
+    s->block = read_floats(context, &block, s->count * BLOCK);
+    s->diagonal = read_floats(context, &diagonal, s->count * P);
+    s->step = read_floats(context, &x, s->count * P);
+    s->r = read_floats(context, &r, s->count * P);
+    s->p = read_floats(context, &p, s->count * P);
+    s->polynomial = read_floats(context, &polynomial, s->count * P);
+    s->rz = read_floats(context, &rz, groups);
+    ov_buffer *const buffers[] = {&factor, &gram, &moments, &block,      &diagonal,
+                                  &x,      &r,    &p,       &polynomial, &rz};
+    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+        ov_buffer_destroy(buffers[k]);
+    ov_kernel_destroy(&kernel);
+    free(l);
+}
+
+/* Random ellipsoids with the gram of random points about each, and random moments. */
+static void make_start(test_random *random, size_t count, start *s) {
+    enum { POINTS = 60 };
+    *s = (start){.count = count};
+    s->x = test_alloc(count * P, sizeof *s->x);
+    s->gram = test_alloc(count * OV_GRAM, sizeof *s->gram);
+    s->moments = test_alloc(count * 2 * OV_MONOMIALS, sizeof *s->moments);
+    for (size_t i = 0; i < count; ++i) {
+        double xyz[3 * POINTS], weight[POINTS];
+        ov_quadric quadric;
+        reference_sum sums[OV_GRAM];
+        random_factor(random, 4.0, s->x + i * P);
+        for (size_t k = OV_FACTOR_L; k < P; ++k) /* floats, as the kernel sees them */
+            s->x[i * P + k] = (float)s->x[i * P + k];
+        ov_factor_quadric(s->x + i * P, &quadric);
+        for (size_t k = 0; k < 3 * POINTS; ++k)
+            xyz[k] = quadric.centre[k % 3] + random_uniform(random, -2.0, 2.0);
+        for (size_t k = 0; k < POINTS; ++k)
+            weight[k] = random_uniform(random, 0.1, 1.0);
+        reference_gram(&quadric, xyz, weight, POINTS, sums);
+        for (size_t m = 0; m < OV_GRAM; ++m)
+            s->gram[i * OV_GRAM + m] = (float)sums[m].value;
+        for (size_t m = 0; m < OV_MONOMIALS; ++m) { /* high and low parts, the low not rounding */
+            s->moments[2 * (i * OV_MONOMIALS + m)] = (float)random_uniform(random, -1.0, 1.0);
+            s->moments[2 * (i * OV_MONOMIALS + m) + 1] = (float)random_uniform(random, -0.1, 0.1);
+        }
+    }
+}
+
+static void destroy_start(start *s) {
+    float *const arrays[] = {s->gram, s->moments, s->block,      s->diagonal, s->step,
+                             s->r,    s->p,       s->polynomial, s->rz};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k)
+        free(arrays[k]);
+    free(s->x);
+}
+
+/* r = -C^T moments and polynomial = C p, C the twin's map; and so the kernel's two are transposes:
+ * (C p) . m = p . (C^T m). */
+static void maps_equal_twin(void **state) {
+    start s;
+    test_random random = {2};
+    make_start(&random, test_size(70, 33), &s);
+    run_start(*state, &s, 0.01f);
+    for (size_t i = 0; i < s.count; ++i) {
+        double map[OV_MONOMIALS][P], left = 0.0, right = 0.0, parts = 0.0;
+        const float *const p = s.p + i * P, *const r = s.r + i * P, *const c = s.polynomial + i * P;
+        reference_factor_map(s.x + i * P, map);
+        for (size_t j = 0; j < P; ++j) {
+            reference_sum gradient = {0}, polynomial = {0};
+            for (size_t m = 0; m < OV_MONOMIALS; ++m) {
+                const float *const pair = s.moments + 2 * (i * OV_MONOMIALS + m);
+                const double moment = (double)pair[0] + pair[1];
+                gradient.value -= map[m][j] * moment;
+                gradient.scale += 4.0 * fabs(map[m][j] * moment);
+                polynomial.value += map[j][m] * p[m];
+                polynomial.scale += 4.0 * fabs(map[j][m] * p[m]);
+            }
+            expect_close(r[j], gradient, 4.0, NULL, "component of r", i * P + j);
+            expect_close(c[j], polynomial, 4.0, NULL, "coefficient", i * P + j);
+            const float *const pair = s.moments + 2 * (i * OV_MONOMIALS + j);
+            left += ((double)pair[0] + pair[1]) * c[j];
+            right -= (double)p[j] * r[j];
+            parts += fabs((double)p[j] * r[j]);
+        }
+        expect_near(left, right, 1e-4 * parts + 1e-9, "(C p) . m");
+        for (size_t j = 0; j < P; ++j)
+            assert_true(s.step[i * P + j] == 0.0f);
+    }
+    destroy_start(&s);
+}
+
+/* C^T G C from the 35 sums, the products of monomials looked up by their powers. */
+static void twin_block(const double *x, const float *gram, double lambda, double block[P][P]) {
+    static const int power[OV_MONOMIALS][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
+                                               {2, 0, 0}, {1, 1, 0}, {1, 0, 1}, {0, 2, 0},
+                                               {0, 1, 1}, {0, 0, 2}};
+    double map[OV_MONOMIALS][P], sum_of[5][5][5];
+    size_t n = 0;
+    for (int degree = 0; degree <= 4; ++degree)
+        for (int a = degree; a >= 0; --a)
+            for (int b = degree - a; b >= 0; --b)
+                sum_of[a][b][degree - a - b] = gram[n++];
+    reference_factor_map(x, map);
+    for (int i = 0; i < P; ++i)
+        for (int j = 0; j < P; ++j) {
+            block[i][j] = 0.0;
+            for (int k = 0; k < OV_MONOMIALS; ++k)
+                for (int m = 0; m < OV_MONOMIALS; ++m)
+                    block[i][j] += map[k][i] * map[m][j] *
+                                   sum_of[power[k][0] + power[m][0]][power[k][1] + power[m][1]]
+                                         [power[k][2] + power[m][2]];
+        }
+    for (int i = 0; i < P; ++i)
+        block[i][i] *= 1.0 + lambda;
+}
+
+/* The blocks multiplied out again; the diagonal; p = block^-1 r; and rz = r . p of each group. */
+static void blocks_equal_twin(void **state) {
+    start s;
+    test_random random = {3};
+    const double lambda = 0.05;
+    double worst = 0.0;
+    make_start(&random, test_size(100, 33), &s);
+    run_start(*state, &s, (float)lambda);
+    double rz[8] = {0.0};
+    for (size_t i = 0; i < s.count; ++i) {
+        const float *const rows = s.block + i * BLOCK;
+        double wanted[P][P], lower[P][P] = {{0.0}};
+        twin_block(s.x + i * P, s.gram + i * OV_GRAM, lambda, wanted);
+        for (int j = 0; j < P; ++j)
+            for (int k = 0; k <= j; ++k)
+                lower[j][k] = j == k ? 1.0 / rows[j * (j + 1) / 2 + k] : rows[j * (j + 1) / 2 + k];
+        for (int j = 0; j < P; ++j) {
+            const float r = s.r[i * P + (size_t)j];
+            double product = 0.0, scale = 0.0;
+            for (int k = 0; k < P; ++k) {
+                const double unit = sqrt(wanted[j][j] * wanted[k][k]);
+                double entry = 0.0;
+                for (int m = 0; m <= (j < k ? j : k); ++m)
+                    entry += lower[j][m] * lower[k][m];
+                worst = fmax(worst, fabs(entry - wanted[j][k]) / unit);
+                product += wanted[j][k] * s.p[i * P + (size_t)k];
+                scale += unit * fabs(s.p[i * P + (size_t)k]);
+            }
+            expect_near(product, r, 3e-5 * scale, "block p");
+            const double diagonal = wanted[j][j] / (1.0 + lambda);
+            expect_near(s.diagonal[i * P + (size_t)j], diagonal, 1e-5 * diagonal, "D");
+            rz[i / OV_SOLVE_GROUP] += (double)r * s.p[i * P + (size_t)j];
+        }
+    }
+    print_message("blocks: %.1e of their diagonals\n", worst);
+    assert_true(worst < 1e-5);
+    for (size_t group = 0; group * OV_SOLVE_GROUP < s.count; ++group)
+        expect_near(s.rz[group], rz[group], 1e-5 * rz[group], "r . z");
+    destroy_start(&s);
+}
+
+/* ---- whole solutions ---------------------------------------------------------------------- */
+
+/* A model about points, with weights and residuals; a few of them without weight. */
+typedef struct problem {
+    bench b;
+    double *x;
+    float *weight, *u;
+    ov_buffer weights, residuals, moments, gram;
+} problem;
+
+static void create_problem(problem *p, ovoid_context *context, size_t count, size_t points,
+                           size_t lost, uint64_t seed) {
+    test_random random = {seed};
+    ov_quadric *const quadrics = test_alloc(count, sizeof *quadrics);
+    const double half = 1.2 * cbrt((double)count);
+    *p = (problem){.x = test_alloc(count * P, sizeof *p->x)};
+    for (size_t i = 0; i < count; ++i) {
+        random_factor(&random, half, p->x + i * P);
+        for (size_t k = 0; k < P; ++k)
+            p->x[i * P + k] = (float)p->x[i * P + k];
+        if (i < lost)
+            p->x[i * P + OV_FACTOR_CENTRE] += 1000.0;
+        ov_factor_quadric(p->x + i * P, &quadrics[i]);
+    }
+    float *const xyz = random_points(&random, points, half + 2.0);
+    bench_create(&p->b, context, quadrics, count, xyz, points, 1e-30);
+    const size_t all = p->b.points.packs * OV_PACK;
+    p->weight = test_alloc(all, sizeof *p->weight);
+    p->u = test_alloc(all, sizeof *p->u);
+    for (size_t k = 0; k < points; ++k) {
+        p->weight[k] = k % 7 ? (float)random_uniform(&random, 0.2, 2.0) : 0.0f;
+        p->u[k] = p->weight[k] * (float)random_uniform(&random, -0.5, 0.5);
+    }
+    write_floats(context, &p->weights, p->weight, all);
+    write_floats(context, &p->residuals, p->u, all);
+    free(xyz);
+    free(quadrics);
+}
+
+static void destroy_problem(problem *p) {
+    bench_destroy(&p->b);
+    ov_buffer *const buffers[] = {&p->weights, &p->residuals, &p->moments, &p->gram};
+    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+        ov_buffer_destroy(buffers[k]);
+    free(p->x);
+    free(p->weight);
+    free(p->u);
+}
+
+static double *solve(problem *p, ov_solver *solver, double lambda, uint32_t iterations,
+                     double tolerance) {
+    bench *const b = &p->b;
+    test_check(b->context, ov_moments(b->context, &b->operations, &b->points, &b->terms, &b->lists,
+                                      &p->residuals, &p->moments));
+    test_check(b->context, ov_gram(b->context, &b->operations, &b->points, &b->terms, &b->lists,
+                                   &p->weights, &p->gram));
+    const ov_system system = {.points = &b->points,
+                              .terms = &b->terms,
+                              .lists = &b->lists,
+                              .weight = &p->weights,
+                              .moments = &p->moments,
+                              .gram = &p->gram,
+                              .parameters = p->x};
+    double *const step = test_alloc(b->terms_count * P, sizeof *step);
+    test_check(b->context, ov_solve(b->context, solver, &b->operations, &system, lambda, iterations,
+                                    tolerance, step));
+    return step;
+}
+
+/* Error of a step in the norm of the matrix, as a share of the dense solution. */
+static double error_of(const problem *p, const double *step, double lambda) {
+    const size_t count = p->b.terms_count, size = count * P;
+    double *const matrix = test_alloc(size * size, sizeof *matrix);
+    double *const factored = test_alloc(size * size, sizeof *factored);
+    double *const wanted = test_alloc(size, sizeof *wanted);
+    double error = 0.0, whole = 0.0;
+    reference_system(p->x, count, p->b.xyz, p->weight, p->u, p->b.count, lambda, matrix, wanted);
+    memcpy(factored, matrix, size * size * sizeof *matrix);
+    assert_true(reference_solve(factored, size, wanted));
+    for (size_t i = 0; i < size; ++i)
+        for (size_t j = 0; j < size; ++j) {
+            const double entry = matrix[i * size + j];
+            error += entry * (step[i] - wanted[i]) * (step[j] - wanted[j]);
+            whole += entry * wanted[i] * wanted[j];
+        }
+    free(matrix);
+    free(factored);
+    free(wanted);
+    assert_true(whole > 0.0);
+    return sqrt(fmax(error, 0.0) / whole);
+}
+
+static void expect_solution(ovoid_context *context, size_t count, size_t points, size_t lost,
+                            double lambda, uint32_t iterations, double tolerance) {
+    problem p;
+    ov_solver solver = {0};
+    create_problem(&p, context, count, points, lost, 100 + count);
+    double *const step = solve(&p, &solver, lambda, iterations, 1e-6);
+    const double error = error_of(&p, step, lambda);
+    print_message("%zu ellipsoids, lambda %g: error %.1e after %llu iterations\n", count, lambda,
+                  error, (unsigned long long)solver.iterations);
+    assert_true(error < tolerance);
+    for (size_t j = 0; j < lost * P; ++j)
+        assert_true(step[j] == 0.0);
+    free(step);
+    ov_solver_destroy(&solver);
+    destroy_problem(&p);
+}
+
+static void several_ellipsoids(void **state) {
+    expect_solution(*state, test_size(6, 2), test_size(600, 60), 0, 0.1, 100, 1e-5);
+    if (!test_small())
+        expect_solution(*state, 6, 600, 0, 1e-3, 200, 1e-5);
+}
+
+/* The preconditioner is the matrix's inverse then, lambda included: one iteration will do. */
+static void one_ellipsoid_takes_one_iteration(void **state) {
+    expect_solution(*state, 1, test_size(400, 60), 0, 0.1, 1, 1e-5);
+    expect_solution(*state, 1, test_size(400, 60), 0, 1e-3, 1, 1e-5);
+}
+
+/* Counts about the size of a group, and several groups. */
+static void more_than_one_group(void **state) {
+    const size_t counts[] = {33, 64, 100};
+    const size_t tried = test_size(sizeof counts / sizeof *counts, 1);
+    for (size_t n = 0; n < tried; ++n)
+        expect_solution(*state, counts[n], test_size(5 * counts[n], 32), 0,
+                        test_small() ? 200.0 : 0.3, (uint32_t)test_size(60, 4),
+                        test_size(3, 30) * 1e-5);
+}
+
+/* Ellipsoids that reach no point stay still, and do not hinder the others; even undamped. */
+static void ellipsoids_without_points(void **state) {
+    expect_solution(*state, test_size(4, 2), test_size(400, 60), 1, 0.1, 100, 1e-5);
+    expect_solution(*state, 2, 200, 1, 0.0, 1, 1e-4);
+    problem p;
+    ov_solver solver = {0};
+    create_problem(&p, *state, 2, 50, 2, 5);
+    double *const step = solve(&p, &solver, 0.1, 10, 1e-3);
+    for (size_t j = 0; j < 2 * P; ++j)
+        assert_true(step[j] == 0.0);
+    assert_int_equal(solver.iterations, 0);
+    free(step);
+    ov_solver_destroy(&solver);
+    destroy_problem(&p);
+}
+
+static void no_residual_no_step(void **state) {
+    problem p;
+    ov_solver solver = {0};
+    create_problem(&p, *state, 3, 100, 0, 6);
+    memset(p.u, 0, p.b.points.packs * OV_PACK * sizeof *p.u);
+    write_floats(*state, &p.residuals, p.u, p.b.points.packs * OV_PACK);
+    double *const step = solve(&p, &solver, 0.01, 10, 1e-3);
+    for (size_t j = 0; j < 3 * P; ++j)
+        assert_true(step[j] == 0.0);
+    assert_int_equal(solver.iterations, 0);
+    free(step);
+    ov_solver_destroy(&solver);
+    destroy_problem(&p);
+}
+
+/* A solver gives the same bits whatever it has solved before, larger or smaller. */
+static void solutions_repeat(void **state) {
+    problem large, small;
+    ov_solver used = {0}, fresh = {0};
+    create_problem(&large, *state, test_size(70, 33), test_size(700, 16), 0, 7);
+    create_problem(&small, *state, 3, 60, 0, 8);
+    const size_t bytes = large.b.terms_count * P * sizeof(double);
+    const uint32_t iterations = (uint32_t)test_size(30, 2);
+    double *const first = solve(&large, &used, 0.01, iterations, 0.0);
+    double *const between = solve(&small, &used, 0.01, iterations, 0.0);
+    double *const second = solve(&large, &used, 0.01, iterations, 0.0);
+    double *const third = solve(&large, &fresh, 0.01, iterations, 0.0);
+    assert_memory_equal(first, second, bytes);
+    assert_memory_equal(first, third, bytes);
+    free(first);
+    free(between);
+    free(second);
+    free(third);
+    ov_solver_destroy(&used);
+    ov_solver_destroy(&fresh);
+    destroy_problem(&large);
+    destroy_problem(&small);
+}
+
+/* Iterations stop at their limit, and at the tolerance where that comes first. */
+static void iterations_end(void **state) {
+    problem p;
+    uint64_t taken[3];
+    double error[3];
+    const double tolerances[3] = {0.3, 1e-2, test_small() ? 1e-3 : 1e-5};
+    create_problem(&p, *state, test_size(30, 3), test_size(400, 32), 0, 9);
+    for (int n = 0; n < 3; ++n) {
+        ov_solver solver = {0};
+        double *const step = solve(&p, &solver, 0.03, 1000, tolerances[n]);
+        taken[n] = solver.iterations;
+        error[n] = error_of(&p, step, 0.03);
+        free(step);
+        ov_solver_destroy(&solver);
+    }
+    print_message("iterations %llu, %llu, %llu; errors %.1e, %.1e, %.1e\n",
+                  (unsigned long long)taken[0], (unsigned long long)taken[1],
+                  (unsigned long long)taken[2], error[0], error[1], error[2]);
+    assert_true(taken[0] < taken[1] && taken[1] < taken[2] && taken[2] < 300);
+    assert_true(error[0] > error[1] && error[1] > error[2]);
+    ov_solver solver = {0};
+    for (uint32_t limit = 0; limit <= test_size(5, 1); ++limit) {
+        solver.iterations = 0;
+        double *const step = solve(&p, &solver, 0.03, limit, 1e-5);
+        assert_int_equal(solver.iterations, limit);
+        assert_true((step[0] == 0.0) == (limit == 0));
+        free(step);
+    }
+    ov_solver_destroy(&solver);
+    destroy_problem(&p);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(twin_is_the_derivative),
+        cmocka_unit_test(maps_equal_twin),
+        cmocka_unit_test(blocks_equal_twin),
+        cmocka_unit_test(several_ellipsoids),
+        cmocka_unit_test(one_ellipsoid_takes_one_iteration),
+        cmocka_unit_test(more_than_one_group),
+        cmocka_unit_test(ellipsoids_without_points),
+        cmocka_unit_test(no_residual_no_step),
+        cmocka_unit_test(solutions_repeat),
+        cmocka_unit_test(iterations_end),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -115,14 +115,6 @@ static inline void ov_add_quartic(ov_vec *sum, ov_vec e, const ov_offset o) {
         _Pragma("unroll") for (uint m = 0; m < (sums); ++m) sum[(first) + m] += part[m];           \
     }
 
-/* high + low += value, error free (Knuth's two-sum). */
-static inline void ov_add(ov_vec *high, ov_vec *low, ov_vec value) {
-    const ov_vec sum = *high + value;
-    const ov_vec part = sum - *high;
-    *low += (*high - (sum - part)) + (value - part);
-    *high = sum;
-}
-
 /* Sum of a vector, halves first. */
 static inline float ov_sum(ov_vec value) {
 #if OV_VECTOR == 1

@@ -23,14 +23,6 @@
 #define OV_TILE (OV_TILE_PACKS / OV_PACKS_AT_ONCE * OV_VECTORS)
 #define OV_FLUSH_TILES (256 / OV_TILE_PACKS)
 
-/* high + low += value, error free (Knuth's two-sum). */
-static inline void ov_add(ov_vec *high, ov_vec *low, ov_vec value) {
-    const ov_vec sum = *high + value;
-    const ov_vec part = sum - *high;
-    *low += (*high - (sum - part)) + (value - part);
-    *high = sum;
-}
-
 /* Halves a pair of vectors by adding its halves, error free. */
 #define OV_FOLD(name, whole, half_type)                                                            \
     static inline void name(whole high, whole low, half_type *high_half, half_type *low_half) {    \

@@ -38,6 +38,50 @@ void ov_rotation_derivatives(const double angle[3], double dr[3][3][3]) {
         }
 }
 
+/* Annihilates a[p][q] by a turn of the axes p and q; v's rows turn with them. */
+static void jacobi_turn(double a[3][3], double v[3][3], int p, int q) {
+    if (a[p][q] == 0.0)
+        return;
+    const double theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+    const double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1.0));
+    const double c = 1.0 / sqrt(t * t + 1.0), s = t * c;
+    for (int k = 0; k < 3; ++k) {
+        const double kp = a[k][p], kq = a[k][q];
+        a[k][p] = c * kp - s * kq;
+        a[k][q] = s * kp + c * kq;
+    }
+    for (int k = 0; k < 3; ++k) {
+        const double pk = a[p][k], qk = a[q][k];
+        a[p][k] = c * pk - s * qk;
+        a[q][k] = s * pk + c * qk;
+        const double vp = v[p][k], vq = v[q][k];
+        v[p][k] = c * vp - s * vq;
+        v[q][k] = s * vp + c * vq;
+    }
+}
+
+void ov_symmetric_axes(double a[3][3], double value[3], double axes[3][3]) {
+    double v[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    for (int sweep = 0; sweep < 12; ++sweep) {
+        jacobi_turn(a, v, 0, 1);
+        jacobi_turn(a, v, 0, 2);
+        jacobi_turn(a, v, 1, 2);
+    }
+    int order[3] = {0, 1, 2};
+    for (int k = 0; k < 2; ++k)
+        for (int j = 0; j < 2; ++j)
+            if (a[order[j]][order[j]] < a[order[j + 1]][order[j + 1]]) {
+                const int swap = order[j];
+                order[j] = order[j + 1];
+                order[j + 1] = swap;
+            }
+    for (int p = 0; p < 3; ++p) {
+        value[p] = a[order[p]][order[p]];
+        for (int k = 0; k < 3; ++k)
+            axes[p][k] = v[order[p]][k];
+    }
+}
+
 void ov_quadratic_form(double r[3][3], const double decay[3], double a[6]) {
     static const int row[6] = {0, 0, 0, 1, 1, 2}, column[6] = {0, 1, 2, 1, 2, 2};
     for (int k = 0; k < 6; ++k) {

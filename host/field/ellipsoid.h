@@ -16,6 +16,10 @@ typedef struct ov_quadric {
 /* R = R_z(angle[2]) R_y(angle[1]) R_x(angle[0]) with the paper's signs (eq. 2.11). */
 void ov_rotation(const double angle[3], double r[3][3]);
 
+/* Jacobi's method: the eigenvalues of a symmetric matrix in descending order, and their directions,
+ * orthogonal unit vectors, in the rows of axes. a is used up. */
+void ov_symmetric_axes(double a[3][3], double value[3], double axes[3][3]);
+
 /* Derivatives of R with respect to the three angles. */
 void ov_rotation_derivatives(const double angle[3], double dr[3][3][3]);
 

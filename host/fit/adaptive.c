@@ -31,7 +31,7 @@
 /* Shrinking: tries, and the share that is merged at first; halved after a failure. */
 #define SHRINKS_PER_EFFORT 3
 #define SHRINK_SHARE 0.08
-/* Repairs: the share of ellipsoids that is split and merged back, and its least. */
+/* Repairs: the share of ellipsoids that is split and merged back at first, and how many rounds. */
 #define REPAIR_SHARE 0.08
 #define REPAIRS_PER_EFFORT 4
 /* Volumes are made equal to this relative error, in so many steps at most. */
@@ -74,7 +74,6 @@ typedef struct fit {
     uint64_t steps; /* refinement steps so far */
     size_t count;   /* ellipsoids being worked on */
     double misfit;
-    double scale;    /* of phi in the target */
     size_t capacity; /* ellipsoids that the arrays below hold */
     ov_quadric *quadrics;
     uint32_t *twin;
@@ -227,11 +226,6 @@ cleanup:
     return status;
 }
 
-static ovoid_status aim_at(fit *f, double scale) {
-    f->scale = scale;
-    return ov_target_scale(f->context, &f->target, scale);
-}
-
 /* Lets further refinement aim at the right volume: the window about the surface is not symmetric,
  * and the fit to phi itself comes out a few tenths of a percent too small or too large. */
 static ovoid_status aim_at_volume(fit *f, const trial *t) {
@@ -239,7 +233,19 @@ static ovoid_status aim_at_volume(fit *f, const trial *t) {
     double ratio;
     quadrics_of(f, t);
     OV_TRY(ov_judge_volume(&f->judge, f->quadrics, t->count, &ratio));
-    OV_TRY(aim_at(f, f->scale * ov_judge_amplitude_factor(&f->judge, ratio)));
+    OV_TRY(ov_target_scale(f->context, &f->target, ov_judge_amplitude_factor(&f->judge, ratio)));
+cleanup:
+    return status;
+}
+
+/* Refined from the starts, under one window, and with the right volume but for a little. */
+static ovoid_status begin(fit *f, size_t window, size_t kinds, size_t count, trial *best) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_target_window(f->context, &f->target, windows[window].width, windows[window].floor));
+    OV_TRY(ov_target_scale(f->context, &f->target, 1.0));
+    OV_TRY(start(f, kinds, count, best));
+    OV_TRY(aim_at_volume(f, best));
+    OV_TRY(refine(f, best, "refine", 5, 1e-1, 1e-3));
 cleanup:
     return status;
 }
@@ -293,11 +299,7 @@ static ovoid_status fit_window(fit *f, size_t count, size_t window, trial *best)
     ovoid_status status = OVOID_OK;
     const uint32_t effort = f->options->adaptive.effort;
     const size_t kinds = 2 * (size_t)effort - 1 < STARTS ? 2 * (size_t)effort - 1 : STARTS;
-    OV_TRY(ov_target_window(f->context, &f->target, windows[window].width, windows[window].floor));
-    OV_TRY(aim_at(f, 1.0));
-    OV_TRY(start(f, kinds, count, best));
-    OV_TRY(aim_at_volume(f, best));
-    OV_TRY(refine(f, best, "refine", 5, 1e-1, 1e-3));
+    OV_TRY(begin(f, window, kinds, count, best));
     if (effort == 1)
         goto cleanup;
     OV_TRY(judge(f, best));
@@ -449,11 +451,7 @@ static ovoid_status take_atoms(fit *f, trial *t) {
 
 static ovoid_status start_and_grow(fit *f, double tolerance, size_t count, trial *best) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(ov_target_window(f->context, &f->target, windows[0].width, windows[0].floor));
-    OV_TRY(aim_at(f, 1.0));
-    OV_TRY(start(f, f->options->adaptive.effort > 1 ? 3 : 1, count, best));
-    OV_TRY(aim_at_volume(f, best));
-    OV_TRY(refine(f, best, "refine", 5, 1e-1, 1e-3));
+    OV_TRY(begin(f, 0, f->options->adaptive.effort > 1 ? 3 : 1, count, best));
     OV_TRY(grow(f, tolerance, best));
 cleanup:
     return status;
@@ -638,7 +636,6 @@ ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t 
              .atoms = atoms,
              .options = options,
              .began = began,
-             .scale = 1.0,
              .refiner = {.context = context}};
     if (options->adaptive.goal == OVOID_GOAL_ELLIPSOIDS && options->adaptive.ellipsoids > atoms)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,

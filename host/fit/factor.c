@@ -29,51 +29,11 @@ void ov_factor_quadric(const double parameters[OV_FACTOR_PARAMETERS], ov_quadric
     quadric->a[5] = l[2] * l[2] + l[4] * l[4] + l[5] * l[5];
 }
 
-/* Annihilates a[p][q] by a rotation of the axes p and q; v's rows turn with them. */
-static void jacobi_turn(double a[3][3], double v[3][3], int p, int q) {
-    if (a[p][q] == 0.0)
-        return;
-    const double theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-    const double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1.0));
-    const double c = 1.0 / sqrt(t * t + 1.0), s = t * c;
-    for (int k = 0; k < 3; ++k) {
-        const double kp = a[k][p], kq = a[k][q];
-        a[k][p] = c * kp - s * kq;
-        a[k][q] = s * kp + c * kq;
-    }
-    for (int k = 0; k < 3; ++k) {
-        const double pk = a[p][k], qk = a[q][k];
-        a[p][k] = c * pk - s * qk;
-        a[q][k] = s * pk + c * qk;
-        const double vp = v[p][k], vq = v[q][k];
-        v[p][k] = c * vp - s * vq;
-        v[q][k] = s * vp + c * vq;
-    }
-}
-
 /* Eigenvalues in descending order; rows of r are their directions, together a rotation. */
 static void eigen(const double form[6], double value[3], double r[3][3]) {
     double a[3][3] = {
         {form[0], form[1], form[2]}, {form[1], form[3], form[4]}, {form[2], form[4], form[5]}};
-    double v[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
-    for (int sweep = 0; sweep < 12; ++sweep) {
-        jacobi_turn(a, v, 0, 1);
-        jacobi_turn(a, v, 0, 2);
-        jacobi_turn(a, v, 1, 2);
-    }
-    int order[3] = {0, 1, 2};
-    for (int k = 0; k < 2; ++k)
-        for (int j = 0; j < 2; ++j)
-            if (a[order[j]][order[j]] < a[order[j + 1]][order[j + 1]]) {
-                const int swap = order[j];
-                order[j] = order[j + 1];
-                order[j + 1] = swap;
-            }
-    for (int p = 0; p < 3; ++p) {
-        value[p] = a[order[p]][order[p]];
-        for (int k = 0; k < 3; ++k)
-            r[p][k] = v[order[p]][k];
-    }
+    ov_symmetric_axes(a, value, r);
     for (int k = 0; k < 3; ++k) {
         const int i = (k + 1) % 3, j = (k + 2) % 3;
         r[2][k] = r[0][i] * r[1][j] - r[0][j] * r[1][i];

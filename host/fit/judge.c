@@ -84,14 +84,10 @@ static int by_distance(const void *a, const void *b) {
     return 0;
 }
 
-static bool is_outer(const ovoid_mesh *mesh, size_t vertex) {
-    return mesh->component[mesh->component_of[vertex]].outer;
-}
-
 static void add_spots(const ovoid_mesh *mesh, const float *distance, double least, ov_spot *spots,
                       size_t *count) {
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (distance[v] >= least && is_outer(mesh, v)) {
+        if (distance[v] >= least && ov_mesh_is_outer(mesh, v)) {
             memcpy(spots[*count].at, mesh->xyz + 3 * v, sizeof spots->at);
             spots[(*count)++].distance = distance[v];
         }
@@ -141,7 +137,7 @@ static void judge_distances(const ovoid_mesh *mesh, const float *distance,
                             ov_judgement *judgement) {
     for (size_t v = 0; v < mesh->vertices; ++v) {
         judgement->hausdorff = fmax(judgement->hausdorff, distance[v]);
-        if (is_outer(mesh, v))
+        if (ov_mesh_is_outer(mesh, v))
             judgement->deviation = fmax(judgement->deviation, distance[v]);
     }
 }

@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A merged ellipsoid counts where its value is at least this. */
-#define CUTOFF 1e-4
 /* Least phi~ among which a misfit is shared out. */
 #define SHARED_MIN 1e-3f
 /* Partners of one ellipsoid that are tried: those whose merge costs least in L2 distance. */
@@ -63,23 +61,6 @@ static size_t partners_of(const ov_component *components, size_t i, const uint32
     return found;
 }
 
-static ovoid_status make_grid(ovoid_context *context, const ov_component *components, size_t count,
-                              ov_grid *grid) {
-    double low[3], high[3];
-    for (int k = 0; k < 3; ++k) {
-        low[k] = INFINITY;
-        high[k] = -INFINITY;
-        for (size_t i = 0; i < count; ++i) {
-            low[k] = fmin(low[k], components[i].mean[k]);
-            high[k] = fmax(high[k], components[i].mean[k]);
-        }
-    }
-    ovoid_status status = ov_grid_create(context, low, high, REACH, count, count, grid);
-    for (size_t i = 0; i < count && status == OVOID_OK; ++i)
-        status = ov_grid_add(context, grid, components[i].mean, (uint32_t)i);
-    return status;
-}
-
 /* Pairs worth trying, each once. */
 static ovoid_status list_candidates(ovoid_context *context, const ov_component *components,
                                     size_t count, candidate **list, size_t *listed) {
@@ -90,7 +71,7 @@ static ovoid_status list_candidates(ovoid_context *context, const ov_component *
     candidate *const made = ov_alloc(context, count * PARTNERS, sizeof *made, "pairs");
     if (!made)
         return OVOID_ERROR_MEMORY;
-    OV_TRY(make_grid(context, components, count, &grid));
+    OV_TRY(ov_grid_of(context, components->mean, sizeof *components, count, REACH, &grid));
     for (size_t i = 0; i < count; ++i) {
         const size_t near_count = ov_grid_near(&grid, components[i].mean, UINT32_MAX, near);
         found += partners_of(components, i, near, near_count, made + found);
@@ -128,7 +109,8 @@ static ovoid_status upload_pairs(ov_refiner *r, ov_merger *m, const ov_target *t
         ov_component_merge(&components[list[n].i], &components[list[n].j], &both);
         ov_quadric_of_component(&both, &merged[n]);
     }
-    OV_TRY(ov_terms_set(r->context, &m->merged, merged, listed, target->points->origin, CUTOFF));
+    OV_TRY(ov_terms_set(r->context, &m->merged, merged, listed, target->points->origin,
+                        OV_REFINE_CUTOFF));
     OV_TRY(ov_buffer_reserve(r->context, &m->pairs, 2 * listed * sizeof *pairs, "pairs"));
     OV_TRY(ov_buffer_write(r->context, &m->pairs, 0, pairs, 2 * listed * sizeof *pairs));
 cleanup:

@@ -228,3 +228,21 @@ size_t ov_grid_near(const ov_grid *grid, const double centre[3], uint32_t below,
     }
     return count < OV_NEAR_MAX ? count : OV_NEAR_MAX;
 }
+
+static const double *strided(const double *points, size_t stride, size_t n) {
+    return (const double *)((const char *)points + n * stride);
+}
+
+ovoid_status ov_grid_of(ovoid_context *context, const double *points, size_t stride, size_t count,
+                        double reach, ov_grid *grid) {
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t n = 0; n < count; ++n)
+        for (int k = 0; k < 3; ++k) {
+            low[k] = fmin(low[k], strided(points, stride, n)[k]);
+            high[k] = fmax(high[k], strided(points, stride, n)[k]);
+        }
+    ovoid_status status = ov_grid_create(context, low, high, reach, count, count, grid);
+    for (size_t n = 0; n < count && status == OVOID_OK; ++n)
+        status = ov_grid_add(context, grid, strided(points, stride, n), (uint32_t)n);
+    return status;
+}

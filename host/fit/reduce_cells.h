@@ -66,6 +66,10 @@ ovoid_status ov_grid_create(ovoid_context *context, const double low[3], const d
                             double reach, size_t expected, size_t indices, ov_grid *grid);
 void ov_grid_destroy(ov_grid *grid);
 
+/* A grid of `count` >= 1 points, x, y, z each and `stride` bytes apart, with their numbers. */
+ovoid_status ov_grid_of(ovoid_context *context, const double *points, size_t stride, size_t count,
+                        double reach, ov_grid *grid);
+
 ovoid_status ov_grid_add(ovoid_context *context, ov_grid *grid, const double centre[3],
                          uint32_t index);
 

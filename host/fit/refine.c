@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A term counts where its value is at least this. */
-#define CUTOFF 1e-4
 /* How far (angstrom) a cut-off ellipsoid may move before the lists are rebuilt: at first, and later
  * SKIN_GROWTH times what it moved before, within bounds. */
 #define SKIN 0.3
@@ -38,7 +36,7 @@ static ovoid_status make_room(ov_refiner *r, size_t count) {
 
 static double motion(const ov_evaluation *e, const double *x, size_t i) {
     return ov_factor_motion(e->listed + i * OV_FACTOR_PARAMETERS, x + i * OV_FACTOR_PARAMETERS,
-                            CUTOFF);
+                            OV_REFINE_CUTOFF);
 }
 
 static bool lists_cover(const ov_evaluation *e, const ov_points *points, const double *x,
@@ -64,7 +62,7 @@ static ovoid_status set_terms(ov_refiner *r, ov_evaluation *e, const ov_points *
     for (size_t i = 0; i < count; ++i)
         ov_factor_quadric(x + i * OV_FACTOR_PARAMETERS, &r->quadrics[i]);
     return ov_terms_set_skins(r->context, &e->terms, r->quadrics, e->skins, count, points->origin,
-                              CUTOFF);
+                              OV_REFINE_CUTOFF);
 }
 
 /* Sets the terms, and builds the lists again if they do not cover them any more. */

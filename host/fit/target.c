@@ -131,23 +131,6 @@ cleanup:
     return status;
 }
 
-static ovoid_status grid_of_places(ovoid_context *context, const double *places, size_t stride,
-                                   size_t count, double reach, ov_grid *grid) {
-    double low[3], high[3];
-    for (size_t n = 0; n < count; ++n) {
-        const double *const at = (const double *)((const char *)places + n * stride);
-        for (int k = 0; k < 3; ++k) {
-            low[k] = n == 0 ? at[k] : fmin(low[k], at[k]);
-            high[k] = n == 0 ? at[k] : fmax(high[k], at[k]);
-        }
-    }
-    ovoid_status status = ov_grid_create(context, low, high, reach, count, count, grid);
-    for (size_t n = 0; n < count && status == OVOID_OK; ++n)
-        status = ov_grid_add(context, grid, (const double *)((const char *)places + n * stride),
-                             (uint32_t)n);
-    return status;
-}
-
 ovoid_status ov_target_emphasise(ovoid_context *context, ov_target *target, const double *places,
                                  size_t stride, size_t count, double reach, double factor) {
     ovoid_status status = OVOID_OK;
@@ -160,7 +143,7 @@ ovoid_status ov_target_emphasise(ovoid_context *context, ov_target *target, cons
         return OVOID_ERROR_MEMORY;
     if (count == 0)
         goto cleanup;
-    OV_TRY(grid_of_places(context, places, stride, count, reach, &grid));
+    OV_TRY(ov_grid_of(context, places, stride, count, reach, &grid));
     OV_TRY(ov_buffer_read(context, &points->xyz, 0, xyz, 3 * size * sizeof *xyz));
     for (size_t k = 0; k < size; ++k) {
         const float *const p = xyz + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;

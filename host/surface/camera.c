@@ -30,28 +30,6 @@ static bool normalize(double v[3]) {
 
 /* ---- principal axes ----------------------------------------------------------------------- */
 
-/* Turns the plane (p, q) until m[p][q] is 0 (Jacobi's method). */
-static void jacobi_turn(double m[3][3], double vectors[3][3], int p, int q) {
-    if (m[p][q] == 0.0)
-        return;
-    const double theta = 0.5 * (m[q][q] - m[p][p]) / m[p][q];
-    const double t = copysign(1.0, theta) / (fabs(theta) + hypot(theta, 1.0));
-    const double c = 1.0 / hypot(t, 1.0), s = t * c;
-    for (int k = 0; k < 3; ++k) {
-        const double kp = m[k][p], kq = m[k][q];
-        m[k][p] = c * kp - s * kq;
-        m[k][q] = s * kp + c * kq;
-    }
-    for (int k = 0; k < 3; ++k) {
-        const double pk = m[p][k], qk = m[q][k];
-        m[p][k] = c * pk - s * qk;
-        m[q][k] = s * pk + c * qk;
-        const double vp = vectors[p][k], vq = vectors[q][k];
-        vectors[p][k] = c * vp - s * vq;
-        vectors[q][k] = s * vp + c * vq;
-    }
-}
-
 static void covariance(const ov_quadric *quadrics, size_t count, double m[3][3]) {
     double mean[3] = {0.0, 0.0, 0.0};
     memset(m, 0, 9 * sizeof m[0][0]);
@@ -66,23 +44,11 @@ static void covariance(const ov_quadric *quadrics, size_t count, double m[3][3])
 
 /* Unit vectors, largest variance first, each with its largest component positive. */
 static void principal_axes(const ov_quadric *quadrics, size_t count, double axes[3][3]) {
-    double m[3][3], vectors[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    double m[3][3], variance[3], vectors[3][3];
     covariance(quadrics, count, m);
-    for (int sweep = 0; sweep < 12; ++sweep) {
-        jacobi_turn(m, vectors, 0, 1);
-        jacobi_turn(m, vectors, 0, 2);
-        jacobi_turn(m, vectors, 1, 2);
-    }
-    int order[3] = {0, 1, 2};
-    for (int i = 0; i < 2; ++i)
-        for (int k = 0; k < 2; ++k)
-            if (m[order[k + 1]][order[k + 1]] > m[order[k]][order[k]]) {
-                const int swap = order[k];
-                order[k] = order[k + 1];
-                order[k + 1] = swap;
-            }
+    ov_symmetric_axes(m, variance, vectors);
     for (int i = 0; i < 3; ++i) {
-        const double *const v = vectors[order[i]];
+        const double *const v = vectors[i];
         int largest = 0;
         for (int k = 1; k < 3; ++k)
             largest = fabs(v[k]) > fabs(v[largest]) + 1e-9 ? k : largest;

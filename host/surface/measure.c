@@ -39,7 +39,7 @@ static void compare_contents(const ovoid_mesh *original, const ovoid_mesh *spars
 static double largest_of_outer(const ovoid_mesh *mesh, const float *distance) {
     double largest = 0.0;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (mesh->component[mesh->component_of[v]].outer)
+        if (ov_mesh_is_outer(mesh, v))
             largest = fmax(largest, distance[v]);
     return largest;
 }

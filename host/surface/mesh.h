@@ -29,6 +29,10 @@ static inline const ovoid_component *ov_mesh_component_of_triangle(const ovoid_m
     return &mesh->component[mesh->component_of[mesh->corners[3 * triangle]]];
 }
 
+static inline bool ov_mesh_is_outer(const ovoid_mesh *mesh, size_t vertex) {
+    return mesh->component[mesh->component_of[vertex]].outer;
+}
+
 /* Area and volume of all components or of the outer ones alone. */
 typedef struct ov_content {
     double area, volume;

@@ -1,10 +1,14 @@
 /*
- * The two lists that make every pass linear: term -> packs, by walking a tree of boxes over the
- * packs, and pack -> terms, its transpose. Each is counted, scanned on the host, then filled.
+ * The two lists that make every pass linear, pack -> terms and term -> packs.
  *
  * A term reaches a pack if its cut-off ellipsoid q(z) <= reach may meet the pack's box grown by
  * `skin` on every side. The test is tight: it minimises the convex q over the box by coordinate
  * descent, and its lower bound q + min over the box of grad q . (z' - z) never loses a pair.
+ *
+ * Each term walks once down a tree of boxes over the packs. What it finds is kept as entries, one
+ * for each group of OV_GROUP packs with a bit for each of them: both lists are made of these, which
+ * are several times fewer than pairs. Entries go to chunks taken as they are needed, since nobody
+ * knows beforehand how many a term has.
  */
 
 #define OV_SWEEPS 3
@@ -19,32 +23,61 @@
 typedef OV_JOIN(float, OV_TEST) ov_test;
 typedef OV_JOIN(int, OV_TEST) ov_test_hit;
 #define OV_TEST_LOAD OV_JOIN(vload, OV_TEST)
-#define OV_TEST_STORE OV_JOIN(vstore, OV_TEST)
+
+/* A bit for each lane that is set. */
+static inline uint ov_bits(ov_test_hit hit) {
+#if OV_TEST == 16
+    const int16 lane =
+        hit & (int16)(1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7, 1 << 8,
+                      1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15);
+    const int8 eight = lane.lo | lane.hi;
+    const int4 four = eight.lo | eight.hi;
+#elif OV_TEST == 8
+    const int8 lane = hit & (int8)(1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7);
+    const int4 four = lane.lo | lane.hi;
+#else
+    const int4 four = hit & (int4)(1 << 0, 1 << 1, 1 << 2, 1 << 3);
+#endif
+    const int2 two = four.lo | four.hi;
+    return (uint)(two.x | two.y);
+}
+
+/* As clamp(), which compilers make longer for the sake of values that are not finite. */
+static inline ov_test ov_within(ov_test x, ov_test low, ov_test high) {
+    return max(min(x, high), low);
+}
 
 /* -1 where the term may meet the box low..high (relative to its centre), else 0. */
 static inline ov_test_hit ov_meets(const ov_term t, ov_test lx, ov_test ly, ov_test lz, ov_test hx,
                                    ov_test hy, ov_test hz) {
     const ov_test zero = 0.0f;
-    ov_test x = clamp(zero, lx, hx), y = clamp(zero, ly, hy), z = clamp(zero, lz, hz);
-    const float ix = -0.5f / t.xx, iy = -0.5f / t.yy, iz = -0.5f / t.zz;
+    ov_test x = ov_within(zero, lx, hx), y = ov_within(zero, ly, hy), z = ov_within(zero, lz, hz);
+    ov_test lower;
+    if (t.xy == 0.0f && t.xz == 0.0f && t.yz == 0.0f) {
+        /* q is least in each direction by itself, in the point of the box next to the centre */
+        lower = fma(x, x * (2.0f * t.xx), fma(y, y * (2.0f * t.yy), z * (z * (2.0f * t.zz))));
+        lower *= 0.5f;
+    } else {
+        const float ix = -0.5f / t.xx, iy = -0.5f / t.yy, iz = -0.5f / t.zz;
 #pragma unroll
-    for (int sweep = 0; sweep < OV_SWEEPS; ++sweep) {
-        x = clamp(ix * fma(y, (ov_test)(t.xy), z * t.xz), lx, hx);
-        y = clamp(iy * fma(x, (ov_test)(t.xy), z * t.yz), ly, hy);
-        z = clamp(iz * fma(x, (ov_test)(t.xz), y * t.yz), lz, hz);
+        for (int sweep = 0; sweep < OV_SWEEPS; ++sweep) {
+            x = ov_within(ix * fma(y, (ov_test)(t.xy), z * t.xz), lx, hx);
+            y = ov_within(iy * fma(x, (ov_test)(t.xy), z * t.yz), ly, hy);
+            z = ov_within(iz * fma(x, (ov_test)(t.xz), y * t.yz), lz, hz);
+        }
+        const ov_test gx = fma(x, (ov_test)(2.0f * t.xx), fma(y, (ov_test)(t.xy), z * t.xz));
+        const ov_test gy = fma(y, (ov_test)(2.0f * t.yy), fma(x, (ov_test)(t.xy), z * t.yz));
+        const ov_test gz = fma(z, (ov_test)(2.0f * t.zz), fma(x, (ov_test)(t.xz), y * t.yz));
+        const ov_test q = 0.5f * fma(x, gx, fma(y, gy, z * gz));
+        lower = q + min(gx * (lx - x), gx * (hx - x)) + min(gy * (ly - y), gy * (hy - y)) +
+                min(gz * (lz - z), gz * (hz - z));
     }
-    const ov_test gx = fma(x, (ov_test)(2.0f * t.xx), fma(y, (ov_test)(t.xy), z * t.xz));
-    const ov_test gy = fma(y, (ov_test)(2.0f * t.yy), fma(x, (ov_test)(t.xy), z * t.yz));
-    const ov_test gz = fma(z, (ov_test)(2.0f * t.zz), fma(x, (ov_test)(t.xz), y * t.yz));
-    const ov_test q = 0.5f * fma(x, gx, fma(y, gy, z * gz));
-    const ov_test lower = q + min(gx * (lx - x), gx * (hx - x)) +
-                          min(gy * (ly - y), gy * (hy - y)) + min(gz * (lz - z), gz * (hz - z));
     return (lower <= t.reach) & (lx <= hx);
 }
 
-/* Tests the term against the boxes of one group; hit[j] != 0 where box j may be reached. */
-static inline void ov_test_group(const ov_term t, __global const float *group, float skin,
-                                 int *hit) {
+/* Tests the term against the boxes of one group: bit j is set where box j may be reached. */
+static inline uint ov_test_group(const ov_term t, __global const float *group, float skin) {
+    uint bits = 0;
 #pragma unroll
     for (uint v = 0; v < OV_GROUP_VECTORS; ++v) {
         const ov_test lx = OV_TEST_LOAD(v, group) - (t.x + skin);
@@ -53,20 +86,34 @@ static inline void ov_test_group(const ov_term t, __global const float *group, f
         const ov_test hx = OV_TEST_LOAD(v, group + 3 * OV_GROUP) - (t.x - skin);
         const ov_test hy = OV_TEST_LOAD(v, group + 4 * OV_GROUP) - (t.y - skin);
         const ov_test hz = OV_TEST_LOAD(v, group + 5 * OV_GROUP) - (t.z - skin);
-        OV_TEST_STORE(ov_meets(t, lx, ly, lz, hx, hy, hz), v, hit);
+        bits |= ov_bits(ov_meets(t, lx, ly, lz, hx, hy, hz)) << (v * OV_TEST);
     }
+    return bits;
 }
 
-/* What packs_of_terms() writes. */
-#define OV_COUNT 0      /* count[i] alone */
-#define OV_FILL 1       /* the packs of term i, to item[start[i]] and on */
-#define OV_FILL_COUNT 2 /* both, of the packs as many as fit before start[i + 1] */
+/* The lowest bit that is set. */
+static inline uint ov_lowest(uint bits) {
+    return 31 - clz(bits & -bits);
+}
 
-/* The packs of every term in ascending order. */
+/* Bin of the entries of a group: terms that follow one another share it (see shared.h). */
+static inline uint ov_bin(uint group, uint term, uint block) {
+    return group * OV_BINS + term / block;
+}
+
+/* The entries of every term, in ascending order of their groups: entry k of a term is at
+ * k % OV_CHUNK of its chunk k / OV_CHUNK, of which chain[term] holds the first one, next[chunk] the
+ * one after, and chain[term].y the number of entries. Chunks from `room` on are counted, not
+ * written.
+ *
+ * tally, zero at the start: chunks taken, entries of every bin, pairs of every group, pairs of
+ * every term. block: terms that share a bin. */
 __kernel void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
                              const ov_tree tree, __global const float *restrict boxes,
-                             const float skin, const uint mode, __global uint *restrict count,
-                             __global const uint *restrict start, __global uint *restrict item) {
+                             const float skin, const uint groups, const uint block, const uint room,
+                             __global uint *restrict tally, __global uint2 *restrict chain,
+                             __global uint *restrict next, __global uint *restrict entry_group,
+                             __global ushort *restrict entry_bits) {
     /* A copy, made where all work-items still run together: Mesa's compiler does not look up kernel
      * arguments by an index that differs between them. */
     const int levels = (int)tree.levels;
@@ -76,31 +123,40 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
+    __global uint *const bins = tally + 1, *const pairs = bins + (size_t)groups * OV_BINS;
     const ov_term t = terms[index];
-    uint found = 0;
-    uint at = mode == OV_COUNT ? 0 : start[index];
-    const uint end = mode == OV_COUNT ? 0 : mode == OV_FILL ? UINT_MAX : start[index + 1];
+    uint found = 0, entries = 0, first = 0, chunk = 0;
     if (t.reach >= 0.0f && levels > 0) {
         /* Depth first: pending[l] has a bit for each box of the current group of level l that is
          * still to be visited. */
         uint pending[OV_LEVELS];
         uint group[OV_LEVELS];
-        int hit[OV_GROUP];
         int level = levels - 1;
         group[level] = 0;
         bool fresh = true;
         while (level < levels) {
             if (fresh) {
                 const size_t g = first_group[level] + group[level];
-                ov_test_group(t, boxes + g * (6 * OV_GROUP), skin + t.skin, hit);
-                uint bits = 0;
-                for (uint j = 0; j < OV_GROUP; ++j)
-                    bits |= hit[j] ? 1u << j : 0u;
-                if (level == 0) {
-                    found += popcount(bits);
-                    for (uint j = 0; j < OV_GROUP && at < end; ++j)
-                        if (bits >> j & 1u)
-                            item[at++] = group[0] * OV_GROUP + j;
+                uint bits = ov_test_group(t, boxes + g * (6 * OV_GROUP), skin + t.skin);
+                if (level == 0 && bits != 0) {
+                    if (entries % OV_CHUNK == 0) {
+                        const uint taken = atomic_inc(tally);
+                        if (entries == 0)
+                            first = taken;
+                        else if (chunk < room)
+                            next[chunk] = taken;
+                        chunk = taken;
+                    }
+                    if (chunk < room) {
+                        const size_t at = (size_t)chunk * OV_CHUNK + entries % OV_CHUNK;
+                        entry_group[at] = group[0];
+                        entry_bits[at] = (ushort)bits;
+                    }
+                    const uint packs = popcount(bits);
+                    found += packs;
+                    ++entries;
+                    atomic_inc(&bins[ov_bin(group[0], index, block)]);
+                    atomic_add(&pairs[group[0]], packs);
                     bits = 0;
                 }
                 pending[level] = bits;
@@ -110,67 +166,108 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
                 ++level;
                 continue;
             }
-            const uint j = 31 - clz(pending[level] & -pending[level]);
+            const uint j = ov_lowest(pending[level]);
             pending[level] &= pending[level] - 1;
             group[level - 1] = group[level] * OV_GROUP + j;
             --level;
             fresh = true;
         }
     }
-    if (mode != OV_FILL)
-        count[index] = found;
+    pairs[groups + index] = found;
+    chain[index] = (uint2)(first, entries);
 }
 
-/* Closes the gaps that OV_FILL_COUNT leaves: the packs of term i from room[room_start[i]] and on to
- * item[start[i]] and on. */
-__kernel void close_gaps(const uint terms_count, __global const uint *restrict room_start,
-                         __global const uint *restrict room, __global const uint *restrict start,
-                         __global uint *restrict item) {
+/* The packs of every term in ascending order: those of term i from item[start[i]] on. */
+__kernel void lists_of_terms(const uint terms_count, __global const uint2 *restrict chain,
+                             __global const uint *restrict next,
+                             __global const uint *restrict entry_group,
+                             __global const ushort *restrict entry_bits,
+                             __global const uint *restrict start, __global uint *restrict item) {
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
-    __global const uint *const from = room + room_start[index];
-    __global uint *const to = item + start[index];
-    const uint count = start[index + 1] - start[index];
-    for (uint k = 0; k < count; ++k)
-        to[k] = from[k];
+    const uint entries = chain[index].y;
+    uint chunk = chain[index].x;
+    uint to = start[index];
+    for (uint k = 0; k < entries; ++k) {
+        if (k > 0 && k % OV_CHUNK == 0)
+            chunk = next[chunk];
+        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
+        const uint pack = entry_group[at] * OV_GROUP;
+        for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
+            item[to++] = pack + ov_lowest(bits);
+    }
 }
 
-/* count[p] += 1 for every term of pack p; count starts at zero. */
-__kernel void count_transposed(const uint terms_count, __global const uint *restrict start,
-                               __global const uint *restrict item, __global uint *restrict count) {
+/* Hands the entries to their groups: place holds where each bin begins, and afterwards ends. The
+ * order within a bin depends on timing. */
+__kernel void
+entries_of_groups(const uint terms_count, const uint block, __global const uint2 *restrict chain,
+                  __global const uint *restrict next, __global const uint *restrict entry_group,
+                  __global const ushort *restrict entry_bits, __global uint *restrict place,
+                  __global uint *restrict group_term, __global ushort *restrict group_bits) {
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
-    for (uint k = start[index]; k < start[index + 1]; ++k)
-        atomic_inc(&count[item[k]]);
+    const uint entries = chain[index].y;
+    uint chunk = chain[index].x;
+    for (uint k = 0; k < entries; ++k) {
+        if (k > 0 && k % OV_CHUNK == 0)
+            chunk = next[chunk];
+        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
+        const uint to = atomic_inc(&place[ov_bin(entry_group[at], index, block)]);
+        group_term[to] = index;
+        group_bits[to] = entry_bits[at];
+    }
 }
 
-/* Writes the transpose; cursor starts as a copy of the transposed list's start. The order within a
- * pack depends on timing, so sort_lists() follows. */
-__kernel void fill_transposed(const uint terms_count, __global const uint *restrict start,
-                              __global const uint *restrict item, __global uint *restrict cursor,
-                              __global uint *restrict transposed) {
-    const uint index = get_global_id(0);
-    if (index >= terms_count)
+/* The terms of every pack in ascending order, so that sums have one order: a work-item sorts the
+ * entries of its group, and makes the lists of its packs from them. Insertion sort: only entries of
+ * the same bin can be in disorder, and few are.
+ *
+ * place: where the entries of each bin end, then where the pairs of each group begin. */
+__kernel void lists_of_packs(const uint groups, const uint packs,
+                             __global const uint *restrict place, __global uint *group_term,
+                             __global ushort *group_bits, __global uint *restrict start,
+                             __global uint *restrict item) {
+    const uint group = get_global_id(0);
+    if (group >= groups)
         return;
-    for (uint k = start[index]; k < start[index + 1]; ++k)
-        transposed[atomic_inc(&cursor[item[k]])] = index;
-}
-
-/* Sorts each list in ascending order, so that sums have one order. Insertion sort: lists are short
- * and nearly sorted. */
-__kernel void sort_lists(const uint count, __global const uint *restrict start,
-                         __global uint *restrict item) {
-    const uint index = get_global_id(0);
-    if (index >= count)
-        return;
-    const uint first = start[index], end = start[index + 1];
-    for (uint k = first + 1; k < end; ++k) {
-        const uint value = item[k];
+    __global const uint *const bin_end = place, *const pair_start =
+                                                    place + (size_t)groups * OV_BINS;
+    const uint first = group == 0 ? 0 : bin_end[group * OV_BINS - 1];
+    const uint end = bin_end[group * OV_BINS + OV_BINS - 1];
+    const uint16 lane = (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    uint16 counts = 0;
+    for (uint k = first; k < end; ++k) {
+        const uint term = group_term[k];
+        const ushort bits = group_bits[k];
         uint hole = k;
-        for (; hole > first && item[hole - 1] > value; --hole)
-            item[hole] = item[hole - 1];
-        item[hole] = value;
+        for (; hole > first && group_term[hole - 1] > term; --hole) {
+            group_term[hole] = group_term[hole - 1];
+            group_bits[hole] = group_bits[hole - 1];
+        }
+        if (hole != k) {
+            group_term[hole] = term;
+            group_bits[hole] = bits;
+        }
+        counts += (uint16)(bits) >> lane & 1u;
+    }
+    uint cursor[OV_GROUP];
+    vstore16(counts, 0, cursor);
+    uint at = pair_start[group];
+    for (uint j = 0; j < OV_GROUP; ++j) {
+        const uint count = cursor[j];
+        cursor[j] = at;
+        if (group * OV_GROUP + j < packs)
+            start[group * OV_GROUP + j] = at;
+        at += count;
+    }
+    if (group == groups - 1)
+        start[packs] = at;
+    for (uint k = first; k < end; ++k) {
+        const uint term = group_term[k];
+        for (uint bits = group_bits[k]; bits != 0; bits &= bits - 1)
+            item[cursor[ov_lowest(bits)]++] = term;
     }
 }

@@ -26,6 +26,10 @@ typedef float ov_f32;
 /* Boxes in a group of the tree over packs or terms, and levels of that tree (16^7 leaves). */
 #define OV_GROUP 16
 #define OV_LEVELS 7
+/* What lists are made of (kernels/lists.cl): entries in a chunk, and bins for the entries of a
+ * group. The more bins, the fewer entries come to lie in disorder. */
+#define OV_CHUNK 16
+#define OV_BINS 8
 /* Monomials of degree up to 2 in z = y - centre: 1, x, y, z, xx, xy, xz, yy, yz, zz. */
 #define OV_MONOMIALS 10
 /* Monomials of degree up to 4, of which the products of two of those above are made: 1; x, y, z;

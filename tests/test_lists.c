@@ -270,43 +270,104 @@ static void lists_can_be_rebuilt(void **state) {
     bench_destroy(&b);
 }
 
-/* The transpose is filled in whatever order work-items happen to run; here, in the worst one. */
+/* Entries come to their group in whatever order work-items happen to run; here, in the worst one.
+ */
 static void lists_are_sorted_on_the_device(void **state) {
-    enum { LISTS = 9, LENGTH = 40 };
+    enum { GROUPS = 9, PACKS = GROUPS * OV_GROUP - 3, LENGTH = 60 };
     test_random random = {95};
-    uint32_t start[LISTS + 1], item[LISTS * LENGTH];
-    ov_kernel sort = {0};
-    ov_buffer starts = {0}, items = {0};
-    const cl_uint count = LISTS;
-    size_t used = 0;
-    for (size_t i = 0; i < LISTS; ++i) {
-        const size_t length = i == 0 ? 0 : i == 1 ? 1 : LENGTH - i;
-        start[i] = (uint32_t)used;
-        for (size_t k = 0; k < length; ++k)
-            item[used++] = i == 2 ? (uint32_t)(length - k) : (uint32_t)(random_bits(&random) >> 40);
-    }
-    start[LISTS] = (uint32_t)used;
-    test_check(*state, ov_kernel_create(*state, "lists", "sort_lists", &sort));
-    test_check(*state, ov_buffer_reserve(*state, &starts, sizeof start, "starts"));
-    test_check(*state, ov_buffer_write(*state, &starts, 0, start, sizeof start));
-    test_check(*state, ov_buffer_reserve(*state, &items, used * sizeof *item, "items"));
-    test_check(*state, ov_buffer_write(*state, &items, 0, item, used * sizeof *item));
-    test_check(*state, OV_LAUNCH(*state, &sort, LISTS, 1, OV_ARG(count), OV_ARG(starts.memory),
-                                 OV_ARG(items.memory)));
-    uint32_t *const got = read_indices(*state, &items, used);
-    for (size_t i = 0; i < LISTS; ++i) {
-        uint64_t before = 0, after = 0; /* what is in a list stays in it */
-        for (uint32_t k = start[i]; k < start[i + 1]; ++k) {
-            assert_true(k == start[i] || got[k - 1] <= got[k]);
-            before += item[k];
-            after += got[k];
+    uint32_t place[GROUPS * OV_BINS + GROUPS] = {0}, term[GROUPS * LENGTH];
+    uint16_t bits[GROUPS * LENGTH];
+    bool paired[PACKS][LENGTH] = {{false}};
+    ov_kernel lists = {0};
+    ov_buffer places = {0}, group_terms = {0}, group_bits = {0}, start = {0}, item = {0};
+    const cl_uint groups = GROUPS, packs = PACKS;
+    uint32_t used = 0, expected = 0;
+    for (uint32_t g = 0; g < GROUPS; ++g) {
+        const uint32_t length = g == 0 ? 0 : g == 1 ? 1 : LENGTH - g;
+        place[GROUPS * OV_BINS + g] = expected;
+        for (uint32_t k = 0; k < length; ++k, ++used) {
+            /* backwards, or in a stride without a common factor */
+            const uint32_t i = g % 2 ? length - 1 - k : k * 23 % length;
+            const uint32_t left = PACKS - g * OV_GROUP;
+            const uint32_t mask = left < OV_GROUP ? (1u << left) - 1u : (1u << OV_GROUP) - 1u;
+            term[used] = i;
+            bits[used] = (uint16_t)(random_bits(&random) >> 40 & mask);
+            for (uint32_t j = 0; j < OV_GROUP && j < left; ++j)
+                if (bits[used] >> j & 1u && !paired[g * OV_GROUP + j][i]) {
+                    paired[g * OV_GROUP + j][i] = true;
+                    ++expected;
+                }
         }
-        assert_true(before == after);
+        for (uint32_t bin = 0; bin < OV_BINS; ++bin)
+            place[g * OV_BINS + bin] = used; /* where they end; the first bin has all of them */
     }
-    free(got);
-    ov_kernel_destroy(&sort);
-    ov_buffer_destroy(&starts);
-    ov_buffer_destroy(&items);
+    test_check(*state, ov_kernel_create(*state, "lists", "lists_of_packs", &lists));
+    test_check(*state, ov_buffer_reserve(*state, &places, sizeof place, "places"));
+    test_check(*state, ov_buffer_write(*state, &places, 0, place, sizeof place));
+    test_check(*state, ov_buffer_reserve(*state, &group_terms, sizeof term, "terms"));
+    test_check(*state, ov_buffer_write(*state, &group_terms, 0, term, used * sizeof *term));
+    test_check(*state, ov_buffer_reserve(*state, &group_bits, sizeof bits, "bits"));
+    test_check(*state, ov_buffer_write(*state, &group_bits, 0, bits, used * sizeof *bits));
+    test_check(*state, ov_buffer_reserve(*state, &start, (PACKS + 1) * sizeof *term, "starts"));
+    test_check(*state, ov_buffer_reserve(*state, &item, expected * sizeof *term, "items"));
+    test_check(*state,
+               OV_LAUNCH(*state, &lists, GROUPS, 1, OV_ARG(groups), OV_ARG(packs),
+                         OV_ARG(places.memory), OV_ARG(group_terms.memory),
+                         OV_ARG(group_bits.memory), OV_ARG(start.memory), OV_ARG(item.memory)));
+    uint32_t *const starts = read_indices(*state, &start, PACKS + 1);
+    uint32_t *const items = read_indices(*state, &item, expected);
+    expect_csr(starts, items, PACKS, expected, LENGTH);
+    for (size_t pack = 0; pack < PACKS; ++pack)
+        for (uint32_t i = 0; i < LENGTH; ++i)
+            assert_true(holds(starts, items, pack, i) == paired[pack][i]);
+    free(starts);
+    free(items);
+    ov_kernel_destroy(&lists);
+    ov_buffer_destroy(&places);
+    ov_buffer_destroy(&group_terms);
+    ov_buffer_destroy(&group_bits);
+    ov_buffer_destroy(&start);
+    ov_buffer_destroy(&item);
+}
+
+/* Terms that reach nearly all packs need far more chunks than lists begin with, some of them in the
+ * middle of a chunk's entries, and lists of packs alone are the same. */
+static void wide_terms_find_room(void **state) {
+    enum { TERMS = 5 };
+    const double cutoff = 1e-4;
+    const size_t points = test_size(3000, 500) * OV_PACK, packs = points / OV_PACK;
+    test_random random = {97};
+    ov_quadric quadrics[TERMS] = {0};
+    for (int i = 0; i < TERMS; ++i) {
+        quadrics[i].amplitude = 1.0;
+        quadrics[i].a[0] = quadrics[i].a[3] = quadrics[i].a[5] = i == 3 ? 1.0 : 1e-5 * (i + 1.0);
+        quadrics[i].centre[0] = 4.0 * i;
+    }
+    float *const xyz = random_points(&random, points, 10.0);
+    bench b;
+    pairs p;
+    tally t = {0};
+    bench_create(&b, *state, quadrics, TERMS, xyz, points, cutoff);
+    read_pairs(*state, &b.lists, &p);
+    expect_lists(&p);
+    expect_pairs(&b, &p, cutoff, 0.0, &t);
+    assert_int_equal(p.term_start[1], packs);
+    assert_int_equal(t.excess, 0);
+
+    ov_lists alone = {.packs_only = true};
+    test_check(*state, ov_lists_build(*state, &alone, &b.points, &b.terms, 0.0));
+    assert_null(alone.term_item.memory);
+    assert_int_equal(alone.items, p.items);
+    uint32_t *const start = read_indices(*state, &alone.pack_start, packs + 1);
+    uint32_t *const item = read_indices(*state, &alone.pack_item, alone.items);
+    assert_memory_equal(start, p.pack_start, (packs + 1) * sizeof *start);
+    assert_memory_equal(item, p.pack_item, alone.items * sizeof *item);
+    free(start);
+    free(item);
+    free(xyz);
+    free_pairs(&p);
+    ov_lists_destroy(&alone);
+    bench_destroy(&b);
 }
 
 /* Order of construction aside, the same input gives the same lists: sums have one order. */
@@ -334,6 +395,7 @@ int main(void) {
         cmocka_unit_test(nothing_to_pair),
         cmocka_unit_test(lists_can_be_rebuilt),
         cmocka_unit_test(lists_are_sorted_on_the_device),
+        cmocka_unit_test(wide_terms_find_room),
         cmocka_unit_test(lists_are_reproducible),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);

@@ -83,7 +83,7 @@ static ovoid_status check_points(ovoid_context *context, const double *xyz, size
 ovoid_status ov_evaluate(ovoid_context *context, const ov_quadric *quadrics, size_t quadric_count,
                          const double *xyz, size_t count, double *value, double *gradient) {
     ovoid_status status = OVOID_OK;
-    evaluator e = {0};
+    evaluator e = {.lists.packs_only = true};
     if (count == 0)
         return OVOID_OK;
     const size_t piece = count < PIECE ? count : PIECE;

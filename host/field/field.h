@@ -73,25 +73,23 @@ void ov_terms_destroy(ov_terms *terms);
 /* ---- lists -------------------------------------------------------------------------------- */
 
 typedef struct ov_lists {
+    bool packs_only; /* set by the owner: term_start and term_item are not wanted */
     size_t terms, packs;
     size_t items;         /* term-pack pairs; each list holds this many entries */
     ov_buffer term_start; /* terms + 1 */
     ov_buffer term_item;  /* packs of each term, ascending */
     ov_buffer pack_start; /* packs + 1 */
     ov_buffer pack_item;  /* terms of each pack, ascending */
-    ov_buffer count;      /* scratch */
-    uint32_t *scan;       /* scratch */
+    /* Scratch, kept for the next time (kernels/lists.cl). */
+    ov_buffer tally, chain, next, entry_group, entry_bits, place, group_term, group_bits;
+    uint32_t *scan;
     size_t scan_capacity;
-    size_t room_terms; /* terms that room is laid out for, 0: none */
-    uint32_t *room; /* room_terms + 1: where each term's packs may go, a little more than it had */
-    size_t room_capacity;
-    ov_buffer room_start, room_item;
-    ov_kernel packs_of_terms, close_gaps, count_transposed, fill_transposed, sort_lists;
+    ov_kernel packs_of_terms, lists_of_terms, entries_of_groups, lists_of_packs;
 } ov_lists;
 
-/* Pairs terms with the packs that they reach, boxes grown by skin and the
- * term's own (angstrom). OVOID_ERROR_LIMIT
- * when there are more pairs than 2^32 - 1 or than a buffer of the device holds. */
+/* Pairs terms with the packs that they reach, boxes grown by skin and the term's own (angstrom).
+ * OVOID_ERROR_LIMIT when there are more pairs than 2^32 - 1 or than a buffer of the device holds.
+ */
 ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
                             const ov_terms *terms, double skin);
 void ov_lists_destroy(ov_lists *lists);

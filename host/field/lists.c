@@ -3,149 +3,165 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Room beyond what a term had: a share of it, and at least so many packs. */
-#define ROOM_SHARE 3
-#define ROOM_LEAST 8
+/* Chunks that a term is taken to need before anything is known; there are as many as the terms of
+ * the last time took, and more when they do not suffice. */
+#define CHUNKS_PER_TERM 3
+
+/* Numbers of what kernels/lists.cl counts. */
+typedef struct plan {
+    cl_uint terms, packs;
+    cl_uint groups;  /* of packs */
+    cl_uint block;   /* terms that share a bin */
+    size_t bins;     /* of all groups */
+    size_t counters; /* chunks, bins, groups */
+    size_t group;    /* work-items of a work-group */
+} plan;
+
+static plan make_plan(const ov_device *device, const ov_points *points, const ov_terms *terms) {
+    plan p = {.terms = (cl_uint)terms->count, .packs = (cl_uint)points->packs};
+    p.groups = (p.packs + OV_GROUP - 1) / OV_GROUP;
+    p.block = p.terms / OV_BINS + 1;
+    p.bins = (size_t)p.groups * OV_BINS;
+    p.counters = 1 + p.bins + p.groups;
+    p.group = ov_item_group(device);
+    return p;
+}
 
 static ovoid_status prepare(ovoid_context *context, ov_lists *lists) {
     ovoid_status status = OVOID_OK;
     if (lists->packs_of_terms.handle)
         return OVOID_OK;
-    OV_TRY(ov_kernel_create(context, "lists", "close_gaps", &lists->close_gaps));
-    OV_TRY(ov_kernel_create(context, "lists", "count_transposed", &lists->count_transposed));
-    OV_TRY(ov_kernel_create(context, "lists", "fill_transposed", &lists->fill_transposed));
-    OV_TRY(ov_kernel_create(context, "lists", "sort_lists", &lists->sort_lists));
+    OV_TRY(ov_kernel_create(context, "lists", "lists_of_terms", &lists->lists_of_terms));
+    OV_TRY(ov_kernel_create(context, "lists", "entries_of_groups", &lists->entries_of_groups));
+    OV_TRY(ov_kernel_create(context, "lists", "lists_of_packs", &lists->lists_of_packs));
     OV_TRY(ov_kernel_create(context, "lists", "packs_of_terms", &lists->packs_of_terms));
 cleanup:
     return status;
 }
 
-/* Turns the counts on the device into starts (count + 1 of them) in `start`; *total is their sum.
- */
-static ovoid_status scan_counts(ovoid_context *context, ov_lists *lists, size_t count,
-                                ov_buffer *start, size_t *total) {
-    ovoid_status status = ov_grow(context, &lists->scan, &lists->scan_capacity, count + 1,
-                                  sizeof *lists->scan, "lists");
-    if (status != OVOID_OK)
-        return status;
-    uint32_t *const scan = lists->scan;
-    OV_TRY(ov_buffer_read(context, &lists->count, 0, scan, count * sizeof *scan));
-    uint64_t sum = 0;
-    for (size_t k = 0; k < count; ++k) {
-        const uint32_t own = scan[k];
-        scan[k] = (uint32_t)sum;
-        sum += own;
-        if (sum > UINT32_MAX) {
-            status = ov_fail(context, OVOID_ERROR_LIMIT,
-                             "more than 2^32 pairs of ellipsoids and packs of points; use a larger "
-                             "spacing");
-            goto cleanup;
-        }
-    }
-    scan[count] = (uint32_t)sum;
-    OV_TRY(ov_buffer_reserve(context, start, (count + 1) * sizeof *scan, "starts of lists"));
-    OV_TRY(ov_buffer_write(context, start, 0, scan, (count + 1) * sizeof *scan));
-    *total = (size_t)sum;
+static ovoid_status reserve_chunks(ovoid_context *context, ov_lists *lists, size_t chunks) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_buffer_reserve(context, &lists->next, chunks * sizeof(cl_uint), "chunks of lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->entry_group, chunks * OV_CHUNK * sizeof(cl_uint),
+                             "chunks of lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->entry_bits, chunks * OV_CHUNK * sizeof(cl_ushort),
+                             "chunks of lists"));
 cleanup:
     return status;
 }
 
-/* See kernels/lists.cl. */
-enum { COUNT, FILL, FILL_COUNT };
+/* Chunks that there is room for. */
+static size_t chunks_held(const ov_lists *lists) {
+    size_t chunks = lists->next.bytes / sizeof(cl_uint);
+    const size_t groups = lists->entry_group.bytes / (OV_CHUNK * sizeof(cl_uint));
+    const size_t bits = lists->entry_bits.bytes / (OV_CHUNK * sizeof(cl_ushort));
+    chunks = groups < chunks ? groups : chunks;
+    chunks = bits < chunks ? bits : chunks;
+    return chunks < UINT32_MAX ? chunks : UINT32_MAX;
+}
 
-static ovoid_status find_packs(ovoid_context *context, ov_lists *lists, const ov_points *points,
-                               const ov_terms *terms, double skin, size_t group, cl_uint mode,
-                               const ov_buffer *start, const ov_buffer *item) {
-    const cl_uint count = (cl_uint)terms->count;
+/* One walk of all terms, and its tally in lists->scan. */
+static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                         const ov_terms *terms, double skin, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    const size_t told = p->counters + (lists->packs_only ? 0 : p->terms);
+    const cl_uint room = (cl_uint)chunks_held(lists);
     const cl_float grow = (cl_float)skin;
-    return OV_LAUNCH(context, &lists->packs_of_terms, terms->count, group, OV_ARG(count),
+    memset(lists->scan, 0, p->counters * sizeof *lists->scan);
+    OV_TRY(
+        ov_buffer_write(context, &lists->tally, 0, lists->scan, p->counters * sizeof *lists->scan));
+    OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, p->terms, p->group, OV_ARG(p->terms),
                      OV_ARG(terms->device.memory), OV_ARG(points->tree),
-                     OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(mode),
-                     OV_ARG(lists->count.memory), OV_ARG(start->memory), OV_ARG(item->memory));
-}
-
-/* Terms that are listed again have moved a little: with some room for each of them one walk finds
- * their packs, where count and fill take two. */
-static ovoid_status lay_room(ovoid_context *context, ov_lists *lists, size_t terms) {
-    ovoid_status status = OVOID_OK;
-    lists->room_terms = 0;
-    OV_TRY(ov_grow(context, &lists->room, &lists->room_capacity, terms + 1, sizeof *lists->room,
-                   "lists"));
-    uint64_t sum = 0;
-    for (size_t i = 0; i < terms; ++i) {
-        const uint32_t had = lists->scan[i + 1] - lists->scan[i];
-        lists->room[i] = (uint32_t)sum;
-        sum += had + had / ROOM_SHARE + ROOM_LEAST;
-        if (sum > UINT32_MAX)
-            return OVOID_OK; /* two walks, then */
-    }
-    lists->room[terms] = (uint32_t)sum;
-    OV_TRY(ov_buffer_reserve(context, &lists->room_start, (terms + 1) * sizeof *lists->room,
-                             "starts of lists"));
-    OV_TRY(ov_buffer_write(context, &lists->room_start, 0, lists->room,
-                           (terms + 1) * sizeof *lists->room));
-    OV_TRY(ov_buffer_reserve(context, &lists->room_item, sum * sizeof(cl_uint),
-                             "packs of ellipsoids"));
-    lists->room_terms = terms;
+                     OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(p->groups),
+                     OV_ARG(p->block), OV_ARG(room), OV_ARG(lists->tally.memory),
+                     OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
+                     OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory)));
+    OV_TRY(ov_buffer_read(context, &lists->tally, 0, lists->scan, told * sizeof *lists->scan));
 cleanup:
     return status;
 }
 
-static bool room_sufficed(const ov_lists *lists) {
-    for (size_t i = 0; i < lists->room_terms; ++i)
-        if (lists->scan[i + 1] - lists->scan[i] > lists->room[i + 1] - lists->room[i])
-            return false;
-    return true;
+/* Finds the entries of all terms. Where their chunks do not suffice, once more with enough. */
+static ovoid_status find_entries(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                                 const ov_terms *terms, double skin, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    const size_t counts = p->counters + p->terms;
+    OV_TRY(ov_grow(context, &lists->scan, &lists->scan_capacity, counts + 1, sizeof *lists->scan,
+                   "lists"));
+    OV_TRY(
+        ov_buffer_reserve(context, &lists->tally, counts * sizeof *lists->scan, "counts of lists"));
+    OV_TRY(
+        ov_buffer_reserve(context, &lists->chain, p->terms * sizeof(cl_uint2), "chunks of lists"));
+    if (!lists->next.memory)
+        OV_TRY(reserve_chunks(context, lists, (size_t)p->terms * CHUNKS_PER_TERM));
+    OV_TRY(walk(context, lists, points, terms, skin, p));
+    if (lists->scan[0] > chunks_held(lists)) {
+        OV_TRY(reserve_chunks(context, lists, lists->scan[0]));
+        OV_TRY(walk(context, lists, points, terms, skin, p));
+    }
+cleanup:
+    return status;
 }
 
-static ovoid_status list_packs(ovoid_context *context, ov_lists *lists, const ov_points *points,
-                               const ov_terms *terms, double skin, size_t group) {
+/* Turns counts into starts; their sum. */
+static uint64_t turn_to_starts(uint32_t *count, size_t size) {
+    uint64_t sum = 0;
+    for (size_t k = 0; k < size; ++k) {
+        const uint32_t own = count[k];
+        count[k] = (uint32_t)sum;
+        sum += own;
+    }
+    return sum;
+}
+
+static ovoid_status make_pack_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
     ovoid_status status = OVOID_OK;
-    const cl_uint count = (cl_uint)terms->count;
-    const size_t most = terms->count > points->packs ? terms->count : points->packs;
-    const bool again = lists->room_terms == terms->count && terms->count > 0;
-    OV_TRY(ov_buffer_reserve(context, &lists->count, most * sizeof(cl_uint), "counts of lists"));
-    OV_TRY(ov_buffer_reserve(context, &lists->term_start, (most + 1) * sizeof(cl_uint),
+    uint32_t *const bins = lists->scan + 1, *const pairs = bins + p->bins;
+    const size_t entries = (size_t)turn_to_starts(bins, p->bins); /* no more than pairs */
+    const uint64_t items = turn_to_starts(pairs, p->groups);
+    if (items > UINT32_MAX)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "more than 2^32 pairs of ellipsoids and packs of points; use a larger "
+                       "spacing");
+    lists->items = (size_t)items;
+    OV_TRY(ov_buffer_reserve(context, &lists->place, (p->bins + p->groups) * sizeof *bins,
                              "starts of lists"));
-    OV_TRY(ov_buffer_reserve(context, &lists->term_item, sizeof(cl_uint), "packs of ellipsoids"));
-    OV_TRY(again ? find_packs(context, lists, points, terms, skin, group, FILL_COUNT,
-                              &lists->room_start, &lists->room_item)
-                 : find_packs(context, lists, points, terms, skin, group, COUNT, &lists->term_start,
-                              &lists->term_item));
-    OV_TRY(scan_counts(context, lists, terms->count, &lists->term_start, &lists->items));
+    OV_TRY(ov_buffer_write(context, &lists->place, 0, bins, (p->bins + p->groups) * sizeof *bins));
+    OV_TRY(ov_buffer_reserve(context, &lists->group_term, entries * sizeof(cl_uint),
+                             "groups of packs"));
+    OV_TRY(ov_buffer_reserve(context, &lists->group_bits, entries * sizeof(cl_ushort),
+                             "groups of packs"));
+    OV_TRY(ov_buffer_reserve(context, &lists->pack_start, (p->packs + (size_t)1) * sizeof *bins,
+                             "starts of lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->pack_item, lists->items * sizeof(cl_uint),
+                             "ellipsoids of packs"));
+    OV_TRY(OV_LAUNCH(context, &lists->entries_of_groups, p->terms, p->group, OV_ARG(p->terms),
+                     OV_ARG(p->block), OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
+                     OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory),
+                     OV_ARG(lists->place.memory), OV_ARG(lists->group_term.memory),
+                     OV_ARG(lists->group_bits.memory)));
+    OV_TRY(OV_LAUNCH(context, &lists->lists_of_packs, p->groups, p->group, OV_ARG(p->groups),
+                     OV_ARG(p->packs), OV_ARG(lists->place.memory),
+                     OV_ARG(lists->group_term.memory), OV_ARG(lists->group_bits.memory),
+                     OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory)));
+cleanup:
+    return status;
+}
+
+static ovoid_status make_term_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    uint32_t *const start = lists->scan + p->counters;
+    start[p->terms] = (uint32_t)turn_to_starts(start, p->terms);
+    OV_TRY(ov_buffer_reserve(context, &lists->term_start, (p->terms + (size_t)1) * sizeof *start,
+                             "starts of lists"));
+    OV_TRY(ov_buffer_write(context, &lists->term_start, 0, start,
+                           (p->terms + (size_t)1) * sizeof *start));
     OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * sizeof(cl_uint),
                              "packs of ellipsoids"));
-    if (again && room_sufficed(lists))
-        return OV_LAUNCH(context, &lists->close_gaps, terms->count, group, OV_ARG(count),
-                         OV_ARG(lists->room_start.memory), OV_ARG(lists->room_item.memory),
-                         OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory));
-    OV_TRY(find_packs(context, lists, points, terms, skin, group, FILL, &lists->term_start,
-                      &lists->term_item));
-    OV_TRY(lay_room(context, lists, terms->count));
-cleanup:
-    return status;
-}
-
-static ovoid_status transpose(ovoid_context *context, ov_lists *lists, size_t packs, size_t group) {
-    ovoid_status status = OVOID_OK;
-    const cl_uint terms = (cl_uint)lists->terms, lists_count = (cl_uint)packs;
-    size_t total = 0;
-    OV_TRY(ov_grow(context, &lists->scan, &lists->scan_capacity, packs + 1, sizeof *lists->scan,
-                   "lists"));
-    memset(lists->scan, 0, packs * sizeof *lists->scan);
-    OV_TRY(ov_buffer_write(context, &lists->count, 0, lists->scan, packs * sizeof *lists->scan));
-    OV_TRY(OV_LAUNCH(context, &lists->count_transposed, lists->terms, group, OV_ARG(terms),
-                     OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
-                     OV_ARG(lists->count.memory)));
-    OV_TRY(scan_counts(context, lists, packs, &lists->pack_start, &total));
-    OV_TRY(ov_buffer_write(context, &lists->count, 0, lists->scan, packs * sizeof *lists->scan));
-    OV_TRY(ov_buffer_reserve(context, &lists->pack_item, total * sizeof(cl_uint),
-                             "ellipsoids of packs"));
-    OV_TRY(OV_LAUNCH(context, &lists->fill_transposed, lists->terms, group, OV_ARG(terms),
-                     OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
-                     OV_ARG(lists->count.memory), OV_ARG(lists->pack_item.memory)));
-    OV_TRY(OV_LAUNCH(context, &lists->sort_lists, packs, group, OV_ARG(lists_count),
-                     OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory)));
+    OV_TRY(OV_LAUNCH(context, &lists->lists_of_terms, p->terms, p->group, OV_ARG(p->terms),
+                     OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
+                     OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory),
+                     OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory)));
 cleanup:
     return status;
 }
@@ -155,28 +171,30 @@ ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_po
     ovoid_status status = OVOID_OK;
     ov_device *device;
     OV_TRY(ov_device_get(context, &device));
-    const size_t group = ov_item_group(device);
+    const plan p = make_plan(device, points, terms);
     OV_TRY(prepare(context, lists));
     lists->terms = terms->count;
     lists->packs = points->packs;
-    OV_TRY(list_packs(context, lists, points, terms, skin, group));
-    OV_TRY(transpose(context, lists, points->packs, group));
+    OV_TRY(find_entries(context, lists, points, terms, skin, &p));
+    OV_TRY(make_pack_lists(context, lists, &p));
+    if (!lists->packs_only)
+        OV_TRY(make_term_lists(context, lists, &p));
 cleanup:
     return status;
 }
 
 void ov_lists_destroy(ov_lists *lists) {
-    ov_buffer *const buffers[] = {&lists->term_start, &lists->term_item, &lists->pack_start,
-                                  &lists->pack_item,  &lists->count,     &lists->room_start,
-                                  &lists->room_item};
+    ov_buffer *const buffers[] = {
+        &lists->term_start, &lists->term_item, &lists->pack_start, &lists->pack_item,
+        &lists->tally,      &lists->chain,     &lists->next,       &lists->entry_group,
+        &lists->entry_bits, &lists->place,     &lists->group_term, &lists->group_bits,
+    };
+    ov_kernel *const kernels[] = {&lists->packs_of_terms, &lists->lists_of_terms,
+                                  &lists->entries_of_groups, &lists->lists_of_packs};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
-    ov_kernel_destroy(&lists->packs_of_terms);
-    ov_kernel_destroy(&lists->count_transposed);
-    ov_kernel_destroy(&lists->fill_transposed);
-    ov_kernel_destroy(&lists->sort_lists);
-    ov_kernel_destroy(&lists->close_gaps);
+    for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
+        ov_kernel_destroy(kernels[k]);
     free(lists->scan);
-    free(lists->room);
     memset(lists, 0, sizeof *lists);
 }

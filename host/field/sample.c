@@ -180,6 +180,7 @@ static ovoid_status evaluate_piece(ovoid_context *context, sampler *s, uint64_t 
     for (size_t axis = 0; axis < 3; ++axis)
         corner[axis] = coordinate(s->lattice, axis, at[axis]);
     OV_TRY(ov_terms_set(context, &s->terms, s->quadrics, count, corner, OV_TARGET_CUTOFF));
+    s->lists.packs_only = true;
     OV_TRY(ov_lists_build(context, &s->lists, &s->points, &s->terms, 0.0));
     OV_TRY(ov_field(context, &s->operations, &s->points, &s->terms, &s->lists, &s->value));
     OV_TRY(ov_buffer_read(context, &s->value, 0, s->values, bytes));

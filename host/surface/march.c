@@ -272,6 +272,7 @@ static ovoid_status evaluate(ovoid_context *context, marcher *m, size_t piece) {
         m->quadrics[k] = m->bodies[m->pieces.term[first + k]].quadric;
     OV_TRY(ov_terms_set(context, &m->terms, m->quadrics, count, m->corner,
                         OV_MARCH_CUTOFF * m->options->isovalue));
+    m->lists.packs_only = true;
     OV_TRY(ov_lists_build(context, &m->lists, &m->points, &m->terms, 0.0));
     OV_TRY(ov_field(context, &m->operations, &m->points, &m->terms, &m->lists, &m->value));
 cleanup:

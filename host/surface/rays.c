@@ -158,6 +158,7 @@ ovoid_status ov_boxes_create(ovoid_context *context, const ov_quadric *quadrics,
     plan_tiles(rays, boxes);
     OV_TRY(make_cells(context, rays, boxes));
     OV_TRY(ov_terms_set(context, &boxes->terms, quadrics, count, origin, cutoff));
+    boxes->lists.packs_only = true;
     OV_TRY(ov_lists_build(context, &boxes->lists, &boxes->cells, &boxes->terms, 0.0));
 cleanup:
     if (status != OVOID_OK)

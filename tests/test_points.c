@@ -48,6 +48,50 @@ static void curve_uses_all_its_bits(void **state) {
     }
 }
 
+/* Skilling's own form of the curve: the axes are turned into the transposed index in place, one bit
+ * plane at a time. */
+static void axes_to_transpose(uint32_t axis[3], unsigned bits) {
+    for (uint32_t bit = 1u << (bits - 1); bit > 1; bit >>= 1) {
+        const uint32_t below = bit - 1;
+        for (int k = 0; k < 3; ++k) {
+            if (axis[k] & bit) {
+                axis[0] ^= below;
+            } else {
+                const uint32_t swap = (axis[0] ^ axis[k]) & below;
+                axis[0] ^= swap;
+                axis[k] ^= swap;
+            }
+        }
+    }
+    axis[1] ^= axis[0];
+    axis[2] ^= axis[1];
+    uint32_t flip = 0;
+    for (uint32_t bit = 1u << (bits - 1); bit > 1; bit >>= 1)
+        if (axis[2] & bit)
+            flip ^= bit - 1;
+    for (int k = 0; k < 3; ++k)
+        axis[k] ^= flip;
+}
+
+static void curve_is_the_one_defined(void **state) {
+    (void)state;
+    test_random random = {5};
+    for (unsigned bits = 1; bits <= 21; ++bits)
+        for (int n = 0; n < 3000; ++n) {
+            const uint32_t mask = (1u << bits) - 1;
+            uint32_t axis[3];
+            for (int k = 0; k < 3; ++k)
+                axis[k] = (uint32_t)(random_bits(&random) >> 20) & mask;
+            const uint64_t index = ov_hilbert_index(axis[0], axis[1], axis[2], bits);
+            axes_to_transpose(axis, bits);
+            uint64_t defined = 0;
+            for (unsigned b = bits; b-- > 0;)
+                for (int k = 0; k < 3; ++k)
+                    defined = defined << 1 | (axis[k] >> b & 1u);
+            assert_true(index == defined);
+        }
+}
+
 /* ---- sort --------------------------------------------------------------------------------- */
 
 static void expect_sorted(ovoid_context *context, const uint64_t *keys, size_t count) {
@@ -284,6 +328,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(curve_visits_every_cell_stepping_to_neighbours),
         cmocka_unit_test(curve_uses_all_its_bits),
+        cmocka_unit_test(curve_is_the_one_defined),
         cmocka_unit_test(sort_orders_keys_of_every_width),
         cmocka_unit_test(sort_takes_small_and_equal_keys),
         cmocka_unit_test(tree_contains_its_leaves),

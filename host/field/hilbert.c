@@ -3,38 +3,35 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* J. Skilling, "Programming the Hilbert curve", AIP Conf. Proc. 707 (2004) 381: the axes are turned
- * into the transposed index in place, one bit plane at a time. */
-static void axes_to_transpose(uint32_t axis[3], unsigned bits) {
-    for (uint32_t bit = 1u << (bits - 1); bit > 1; bit >>= 1) {
-        const uint32_t below = bit - 1;
-        for (int k = 0; k < 3; ++k) {
-            if (axis[k] & bit) {
-                axis[0] ^= below;
-            } else {
-                const uint32_t swap = (axis[0] ^ axis[k]) & below;
-                axis[0] ^= swap;
-                axis[k] ^= swap;
-            }
-        }
-    }
-    axis[1] ^= axis[0];
-    axis[2] ^= axis[1];
-    uint32_t flip = 0;
-    for (uint32_t bit = 1u << (bits - 1); bit > 1; bit >>= 1)
-        if (axis[2] & bit)
-            flip ^= bit - 1;
-    for (int k = 0; k < 3; ++k)
-        axis[k] ^= flip;
-}
+/* The Hilbert curve of J. Skilling, "Programming the Hilbert curve", AIP Conf. Proc. 707 (2004)
+ * 381, as a machine that reads one bit of x, y and z at a time, from the highest: how the curve
+ * runs through a cube, up to its 24 rotations, decides which of the cube's octants comes when, and
+ * how the curve runs through that. states[8 * state + octant] = 8 * next state + place of the
+ * octant, with octant = 4 x + 2 y + z and the first state 0. The tests hold the curve's definition
+ * against it. */
+static const uint8_t states[24 * 8] = {
+    8,   17,  27,  2,   39,  46,  52,  5,   56,  71,  73,  86,  91,  20,  10,  13,  48,  1,
+    103, 110, 115, 18,  12,  21,  126, 129, 29,  26,  79,  80,  140, 3,   148, 43,  37,  34,
+    127, 128, 78,  81,  156, 45,  35,  42,  31,  6,   160, 105, 72,  87,  139, 4,   57,  70,
+    50,  53,  0,   171, 111, 76,  49,  58,  102, 61,  180, 143, 83,  184, 69,  54,  66,  97,
+    16,  123, 9,   74,  47,  60,  38,  77,  132, 95,  85,  14,  67,  144, 82,  33,  142, 55,
+    185, 96,  93,  116, 90,  11,  188, 107, 175, 176, 101, 98,  62,  65,  164, 109, 119, 22,
+    99,  106, 152, 41,  174, 177, 63,  64,  117, 114, 92,  19,  30,  125, 161, 122, 7,   172,
+    104, 75,  130, 25,  133, 166, 179, 136, 84,  191, 94,  15,  141, 28,  145, 32,  138, 51,
+    146, 155, 149, 36,  137, 24,  190, 167, 154, 157, 147, 44,  169, 182, 120, 135, 162, 165,
+    121, 134, 187, 108, 168, 183, 118, 173, 23,  124, 153, 170, 40,  59,  178, 113, 131, 88,
+    181, 158, 68,  151, 186, 163, 89,  112, 189, 100, 150, 159,
+};
 
 uint64_t ov_hilbert_index(uint32_t x, uint32_t y, uint32_t z, unsigned bits) {
-    uint32_t axis[3] = {x, y, z};
-    axes_to_transpose(axis, bits);
     uint64_t index = 0;
-    for (unsigned b = bits; b-- > 0;)
-        for (int k = 0; k < 3; ++k)
-            index = index << 1 | (axis[k] >> b & 1u);
+    unsigned state = 0;
+    for (unsigned b = bits; b-- > 0;) {
+        const unsigned octant = (x >> b & 1u) << 2 | (y >> b & 1u) << 1 | (z >> b & 1u);
+        const unsigned next = states[state | octant];
+        index = index << 3 | (next & 7u);
+        state = next & ~7u;
+    }
     return index;
 }
 

@@ -241,33 +241,43 @@ static bool is_kept(ov_band band, float value, const uint64_t index[3]) {
     return value >= band.low || (value >= band.outside_low && every(band.outside_every, index));
 }
 
+/* Appends point j of the brick that begins at lattice point `first`, if it is on the lattice and
+ * kept. */
+static void keep_point(sampler *s, const uint64_t first[3], uint64_t j, float value, double least) {
+    if (!(value >= least))
+        return;
+    uint64_t index[3];
+    ov_brick_point(j, index);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        index[axis] += first[axis];
+        if (index[axis] >= s->lattice->size[axis])
+            return;
+    }
+    if (!is_kept(s->band, value, index))
+        return;
+    for (size_t axis = 0; axis < 3; ++axis)
+        s->kept[3 * s->kept_count + axis] =
+            (float)(coordinate(s->lattice, axis, index[axis]) - s->origin[axis]);
+    ++s->kept_count;
+}
+
 /* Appends the piece's points that lie on the lattice and are kept. */
 static ovoid_status keep_band(ovoid_context *context, sampler *s, const uint64_t at[3]) {
     const uint64_t *const size = s->pieces.size;
     const uint64_t row = size[0] / OV_BRICK_X, rows = size[1] / OV_BRICK_Y;
+    const double least = lowest(s->band);
     const ovoid_status status =
         ov_grow(context, &s->kept, &s->kept_capacity, 3 * (s->kept_count + s->points.count),
                 sizeof *s->kept, "constrained points");
     if (status != OVOID_OK)
         return status;
-    for (size_t k = 0; k < s->points.count; ++k) {
-        if (!(s->values[k] >= lowest(s->band)))
-            continue;
-        const uint64_t pack = s->order[k / OV_PACK];
-        uint64_t within[3];
-        ov_brick_point(k % OV_PACK, within);
-        const uint64_t index[3] = {
-            at[0] + pack % row * OV_BRICK_X + within[0],
-            at[1] + pack / row % rows * OV_BRICK_Y + within[1],
-            at[2] + pack / (row * rows) * OV_BRICK_Z + within[2],
-        };
-        if (index[0] >= s->lattice->size[0] || index[1] >= s->lattice->size[1] ||
-            index[2] >= s->lattice->size[2] || !is_kept(s->band, s->values[k], index))
-            continue;
-        for (size_t axis = 0; axis < 3; ++axis)
-            s->kept[3 * s->kept_count + axis] =
-                (float)(coordinate(s->lattice, axis, index[axis]) - s->origin[axis]);
-        ++s->kept_count;
+    for (size_t k = 0; k < s->points.packs; ++k) {
+        const uint64_t pack = s->order[k];
+        const uint64_t first[3] = {at[0] + pack % row * OV_BRICK_X,
+                                   at[1] + pack / row % rows * OV_BRICK_Y,
+                                   at[2] + pack / (row * rows) * OV_BRICK_Z};
+        for (uint64_t j = 0; j < OV_PACK; ++j)
+            keep_point(s, first, j, s->values[k * OV_PACK + j], least);
     }
     return check_room(context, s, s->kept_count);
 }

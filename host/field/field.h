@@ -18,7 +18,8 @@ typedef struct ov_points {
     size_t count;
     size_t packs;     /* ceil(count / OV_PACK); the last one is filled up with its last point */
     double origin[3]; /* angstrom, subtracted before rounding to float */
-    uint32_t *order;  /* point k of the packs is point order[k] of the caller, count entries */
+    uint32_t *order;  /* point k of the packs is point order[k] of the caller, count entries; NULL
+                         where nobody needs it */
     ov_tree tree;     /* of boxes over the packs */
     ov_buffer xyz;    /* device: per pack OV_PACK x, y, z */
     ov_buffer boxes;  /* device: the tree's boxes */

@@ -311,12 +311,26 @@ cleanup:
     return status;
 }
 
+/* Frees what the lattice's pieces took. */
+static void drop_pieces(sampler *s) {
+    free(s->values);
+    free(s->kept);
+    s->values = NULL;
+    s->kept = NULL;
+    s->kept_capacity = 0;
+    ov_points_destroy(&s->points);
+    ov_buffer_destroy(&s->value);
+}
+
 /* phi and its gradient once more at the kept points, with the rounding that a fit will see. */
 static ovoid_status finish_samples(ovoid_context *context, sampler *s, ov_samples *samples) {
     ovoid_status status = OVOID_OK;
     const double *const step = s->lattice->step;
     OV_TRY(ov_points_create(context, s->kept, s->kept_count, s->origin,
                             fmax(step[0], fmax(step[1], step[2])), &samples->points));
+    free(samples->points.order); /* nobody asks which of the lattice's points they are */
+    samples->points.order = NULL;
+    drop_pieces(s);
     OV_TRY(ov_grow(context, &s->quadrics, &s->quadrics_capacity, s->atoms, sizeof *s->quadrics,
                    "atoms"));
     for (size_t i = 0; i < s->atoms; ++i)
@@ -331,17 +345,14 @@ cleanup:
 }
 
 static void destroy_sampler(sampler *s) {
+    drop_pieces(s);
     free(s->pieces.start);
     free(s->pieces.atom);
-    free(s->values);
     free(s->order);
     free(s->quadrics);
-    free(s->kept);
-    ov_points_destroy(&s->points);
     ov_terms_destroy(&s->terms);
     ov_lists_destroy(&s->lists);
     ov_operations_destroy(&s->operations);
-    ov_buffer_destroy(&s->value);
 }
 
 ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms, double decay,

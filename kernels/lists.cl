@@ -47,46 +47,72 @@ static inline ov_test ov_within(ov_test x, ov_test low, ov_test high) {
     return max(min(x, high), low);
 }
 
-/* -1 where the term may meet the box low..high (relative to its centre), else 0. */
-static inline ov_test_hit ov_meets(const ov_term t, ov_test lx, ov_test ly, ov_test lz, ov_test hx,
-                                   ov_test hy, ov_test hz) {
-    const ov_test zero = 0.0f;
-    ov_test x = ov_within(zero, lx, hx), y = ov_within(zero, ly, hy), z = ov_within(zero, lz, hz);
-    ov_test lower;
-    if (t.xy == 0.0f && t.xz == 0.0f && t.yz == 0.0f) {
-        /* q is least in each direction by itself, in the point of the box next to the centre */
-        lower = fma(x, x * (2.0f * t.xx), fma(y, y * (2.0f * t.yy), z * (z * (2.0f * t.zz))));
-        lower *= 0.5f;
-    } else {
-        const float ix = -0.5f / t.xx, iy = -0.5f / t.yy, iz = -0.5f / t.zz;
-#pragma unroll
-        for (int sweep = 0; sweep < OV_SWEEPS; ++sweep) {
-            x = ov_within(ix * fma(y, (ov_test)(t.xy), z * t.xz), lx, hx);
-            y = ov_within(iy * fma(x, (ov_test)(t.xy), z * t.yz), ly, hy);
-            z = ov_within(iz * fma(x, (ov_test)(t.xz), y * t.yz), lz, hz);
-        }
-        const ov_test gx = fma(x, (ov_test)(2.0f * t.xx), fma(y, (ov_test)(t.xy), z * t.xz));
-        const ov_test gy = fma(y, (ov_test)(2.0f * t.yy), fma(x, (ov_test)(t.xy), z * t.yz));
-        const ov_test gz = fma(z, (ov_test)(2.0f * t.zz), fma(x, (ov_test)(t.xz), y * t.yz));
-        const ov_test q = 0.5f * fma(x, gx, fma(y, gy, z * gz));
-        lower = q + min(gx * (lx - x), gx * (hx - x)) + min(gy * (ly - y), gy * (hy - y)) +
-                min(gz * (lz - z), gz * (hz - z));
-    }
-    return (lower <= t.reach) & (lx <= hx);
+/* Boxes relative to a term's centre. */
+typedef struct ov_boxes {
+    ov_test lx, ly, lz, hx, hy, hz;
+} ov_boxes;
+
+/* Vector v of a group's boxes, grown by skin. */
+static inline ov_boxes ov_load_boxes(const ov_term t, __global const float *group, uint v,
+                                     float skin) {
+    ov_boxes b;
+    b.lx = OV_TEST_LOAD(v, group) - (t.x + skin);
+    b.ly = OV_TEST_LOAD(v, group + OV_GROUP) - (t.y + skin);
+    b.lz = OV_TEST_LOAD(v, group + 2 * OV_GROUP) - (t.z + skin);
+    b.hx = OV_TEST_LOAD(v, group + 3 * OV_GROUP) - (t.x - skin);
+    b.hy = OV_TEST_LOAD(v, group + 4 * OV_GROUP) - (t.y - skin);
+    b.hz = OV_TEST_LOAD(v, group + 5 * OV_GROUP) - (t.z - skin);
+    return b;
 }
 
-/* Tests the term against the boxes of one group: bit j is set where box j may be reached. */
-static inline uint ov_test_group(const ov_term t, __global const float *group, float skin) {
-    uint bits = 0;
+/* Least q over the boxes, of a term whose axes are the boxes' own: q is least in each direction by
+ * itself, in the point next to the centre. */
+static inline ov_test ov_least_aligned(const ov_term t, const ov_boxes b) {
+    const ov_test zero = 0.0f;
+    const ov_test x = ov_within(zero, b.lx, b.hx), y = ov_within(zero, b.ly, b.hy),
+                  z = ov_within(zero, b.lz, b.hz);
+    return 0.5f * fma(x, x * (2.0f * t.xx), fma(y, y * (2.0f * t.yy), z * (z * (2.0f * t.zz))));
+}
+
+/* A lower bound of q over the boxes. */
+static inline ov_test ov_least(const ov_term t, const ov_boxes b) {
+    const ov_test zero = 0.0f;
+    const float ix = -0.5f / t.xx, iy = -0.5f / t.yy, iz = -0.5f / t.zz;
+    ov_test x, y = ov_within(zero, b.ly, b.hy), z = ov_within(zero, b.lz, b.hz);
+#pragma unroll
+    for (int sweep = 0; sweep < OV_SWEEPS; ++sweep) {
+        x = ov_within(ix * fma(y, (ov_test)(t.xy), z * t.xz), b.lx, b.hx);
+        y = ov_within(iy * fma(x, (ov_test)(t.xy), z * t.yz), b.ly, b.hy);
+        z = ov_within(iz * fma(x, (ov_test)(t.xz), y * t.yz), b.lz, b.hz);
+    }
+    const ov_test gx = fma(x, (ov_test)(2.0f * t.xx), fma(y, (ov_test)(t.xy), z * t.xz));
+    const ov_test gy = fma(y, (ov_test)(2.0f * t.yy), fma(x, (ov_test)(t.xy), z * t.yz));
+    const ov_test gz = fma(z, (ov_test)(2.0f * t.zz), fma(x, (ov_test)(t.xz), y * t.yz));
+    const ov_test q = 0.5f * fma(x, gx, fma(y, gy, z * gz));
+    return q + min(gx * (b.lx - x), gx * (b.hx - x)) + min(gy * (b.ly - y), gy * (b.hy - y)) +
+           min(gz * (b.lz - z), gz * (b.hz - z));
+}
+
+/* Tests the term against the boxes of two groups: bit j is set where box j may be reached. Two at a
+ * time because the test is a chain of operations that wait for each other. */
+static inline uint2 ov_test_groups(const ov_term t, __global const float *one,
+                                   __global const float *other, float skin) {
+    const bool aligned = t.xy == 0.0f && t.xz == 0.0f && t.yz == 0.0f;
+    uint2 bits = 0;
 #pragma unroll
     for (uint v = 0; v < OV_GROUP_VECTORS; ++v) {
-        const ov_test lx = OV_TEST_LOAD(v, group) - (t.x + skin);
-        const ov_test ly = OV_TEST_LOAD(v, group + OV_GROUP) - (t.y + skin);
-        const ov_test lz = OV_TEST_LOAD(v, group + 2 * OV_GROUP) - (t.z + skin);
-        const ov_test hx = OV_TEST_LOAD(v, group + 3 * OV_GROUP) - (t.x - skin);
-        const ov_test hy = OV_TEST_LOAD(v, group + 4 * OV_GROUP) - (t.y - skin);
-        const ov_test hz = OV_TEST_LOAD(v, group + 5 * OV_GROUP) - (t.z - skin);
-        bits |= ov_bits(ov_meets(t, lx, ly, lz, hx, hy, hz)) << (v * OV_TEST);
+        const ov_boxes first = ov_load_boxes(t, one, v, skin);
+        const ov_boxes second = ov_load_boxes(t, other, v, skin);
+        ov_test least_first, least_second;
+        if (aligned) {
+            least_first = ov_least_aligned(t, first);
+            least_second = ov_least_aligned(t, second);
+        } else {
+            least_first = ov_least(t, first);
+            least_second = ov_least(t, second);
+        }
+        bits.x |= ov_bits((least_first <= t.reach) & (first.lx <= first.hx)) << (v * OV_TEST);
+        bits.y |= ov_bits((least_second <= t.reach) & (second.lx <= second.hx)) << (v * OV_TEST);
     }
     return bits;
 }
@@ -127,40 +153,49 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     const ov_term t = terms[index];
     uint found = 0, entries = 0, first = 0, chunk = 0;
     if (t.reach >= 0.0f && levels > 0) {
-        /* Depth first: pending[l] has a bit for each box of the current group of level l that is
-         * still to be visited. */
-        uint pending[OV_LEVELS];
-        uint group[OV_LEVELS];
+        /* Depth first, and two groups of boxes at a time: testing one is a chain of operations that
+         * wait for each other. pending[l] has a bit for each box of the current two groups of level
+         * l that is still to be visited. */
+        uint pending[OV_LEVELS], one[OV_LEVELS], other[OV_LEVELS];
         int level = levels - 1;
-        group[level] = 0;
+        one[level] = other[level] = 0;
         bool fresh = true;
         while (level < levels) {
             if (fresh) {
-                const size_t g = first_group[level] + group[level];
-                uint bits = ov_test_group(t, boxes + g * (6 * OV_GROUP), skin + t.skin);
-                if (level == 0 && bits != 0) {
-                    if (entries % OV_CHUNK == 0) {
-                        const uint taken = atomic_inc(tally);
-                        if (entries == 0)
-                            first = taken;
-                        else if (chunk < room)
-                            next[chunk] = taken;
-                        chunk = taken;
-                    }
-                    if (chunk < room) {
-                        const size_t at = (size_t)chunk * OV_CHUNK + entries % OV_CHUNK;
-                        entry_group[at] = group[0];
-                        entry_bits[at] = (ushort)bits;
-                    }
-                    const uint packs = popcount(bits);
-                    found += packs;
-                    ++entries;
-                    atomic_inc(&bins[ov_bin(group[0], index, block)]);
-                    atomic_add(&pairs[group[0]], packs);
-                    bits = 0;
-                }
-                pending[level] = bits;
+                const size_t base = first_group[level];
+                const uint2 bits =
+                    ov_test_groups(t, boxes + (base + one[level]) * (6 * OV_GROUP),
+                                   boxes + (base + other[level]) * (6 * OV_GROUP), skin + t.skin);
+                pending[level] = bits.x | (one[level] == other[level] ? 0 : bits.y << OV_GROUP);
                 fresh = false;
+                if (level == 0) {
+                    for (uint k = 0; k < 2; ++k) {
+                        const uint own =
+                            k == 0 ? pending[0] & ((1u << OV_GROUP) - 1u) : pending[0] >> OV_GROUP;
+                        const uint group = k == 0 ? one[0] : other[0];
+                        if (own == 0)
+                            continue;
+                        if (entries % OV_CHUNK == 0) {
+                            const uint taken = atomic_inc(tally);
+                            if (entries == 0)
+                                first = taken;
+                            else if (chunk < room)
+                                next[chunk] = taken;
+                            chunk = taken;
+                        }
+                        if (chunk < room) {
+                            const size_t at = (size_t)chunk * OV_CHUNK + entries % OV_CHUNK;
+                            entry_group[at] = group;
+                            entry_bits[at] = (ushort)own;
+                        }
+                        const uint packs = popcount(own);
+                        found += packs;
+                        ++entries;
+                        atomic_inc(&bins[ov_bin(group, index, block)]);
+                        atomic_add(&pairs[group], packs);
+                    }
+                    pending[0] = 0;
+                }
             }
             if (pending[level] == 0) {
                 ++level;
@@ -168,8 +203,16 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
             }
             const uint j = ov_lowest(pending[level]);
             pending[level] &= pending[level] - 1;
-            group[level - 1] = group[level] * OV_GROUP + j;
+            const uint child = (j < OV_GROUP ? one : other)[level] * OV_GROUP + j % OV_GROUP;
+            uint sibling = child;
+            if (pending[level] != 0) {
+                const uint i = ov_lowest(pending[level]);
+                pending[level] &= pending[level] - 1;
+                sibling = (i < OV_GROUP ? one : other)[level] * OV_GROUP + i % OV_GROUP;
+            }
             --level;
+            one[level] = child;
+            other[level] = sibling;
             fresh = true;
         }
     }

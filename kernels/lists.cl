@@ -20,6 +20,13 @@
 #else
 #define OV_TEST OV_VECTOR
 #endif
+/* Groups tested side by side: the test is a chain of operations that wait for each other, and a
+ * group that is one vector is one chain. */
+#if OV_GROUP_VECTORS == 1
+#define OV_SIDES 2
+#else
+#define OV_SIDES 1
+#endif
 typedef OV_JOIN(float, OV_TEST) ov_test;
 typedef OV_JOIN(int, OV_TEST) ov_test_hit;
 #define OV_TEST_LOAD OV_JOIN(vload, OV_TEST)
@@ -93,28 +100,42 @@ static inline ov_test ov_least(const ov_term t, const ov_boxes b) {
            min(gz * (b.lz - z), gz * (b.hz - z));
 }
 
-/* Tests the term against the boxes of two groups: bit j is set where box j may be reached. Two at a
- * time because the test is a chain of operations that wait for each other. */
-static inline uint2 ov_test_groups(const ov_term t, __global const float *one,
-                                   __global const float *other, float skin) {
+/* A bit for each box that the term may reach. */
+static inline uint ov_reached(const ov_term t, const ov_boxes b, ov_test least) {
+    return ov_bits((least <= t.reach) & (b.lx <= b.hx));
+}
+
+/* Tests the term against the boxes of OV_SIDES groups, whose bits follow one another: bit j of a
+ * group is set where its box j may be reached. */
+static inline uint ov_test_groups(const ov_term t, __global const float *one,
+                                  __global const float *other, float skin) {
     const bool aligned = t.xy == 0.0f && t.xz == 0.0f && t.yz == 0.0f;
-    uint2 bits = 0;
+#if OV_SIDES == 2
+    const ov_boxes first = ov_load_boxes(t, one, 0, skin);
+    const ov_boxes second = ov_load_boxes(t, other, 0, skin);
+    ov_test least_first, least_second;
+    if (aligned) {
+        least_first = ov_least_aligned(t, first);
+        least_second = ov_least_aligned(t, second);
+    } else {
+        least_first = ov_least(t, first);
+        least_second = ov_least(t, second);
+    }
+    return ov_reached(t, first, least_first) | ov_reached(t, second, least_second) << OV_GROUP;
+#else
+    uint bits = 0;
 #pragma unroll
     for (uint v = 0; v < OV_GROUP_VECTORS; ++v) {
-        const ov_boxes first = ov_load_boxes(t, one, v, skin);
-        const ov_boxes second = ov_load_boxes(t, other, v, skin);
-        ov_test least_first, least_second;
-        if (aligned) {
-            least_first = ov_least_aligned(t, first);
-            least_second = ov_least_aligned(t, second);
-        } else {
-            least_first = ov_least(t, first);
-            least_second = ov_least(t, second);
-        }
-        bits.x |= ov_bits((least_first <= t.reach) & (first.lx <= first.hx)) << (v * OV_TEST);
-        bits.y |= ov_bits((least_second <= t.reach) & (second.lx <= second.hx)) << (v * OV_TEST);
+        const ov_boxes b = ov_load_boxes(t, one, v, skin);
+        ov_test least;
+        if (aligned)
+            least = ov_least_aligned(t, b);
+        else
+            least = ov_least(t, b);
+        bits |= ov_reached(t, b, least) << (v * OV_TEST);
     }
     return bits;
+#endif
 }
 
 /* The lowest bit that is set. */
@@ -153,9 +174,8 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     const ov_term t = terms[index];
     uint found = 0, entries = 0, first = 0, chunk = 0;
     if (t.reach >= 0.0f && levels > 0) {
-        /* Depth first, and two groups of boxes at a time: testing one is a chain of operations that
-         * wait for each other. pending[l] has a bit for each box of the current two groups of level
-         * l that is still to be visited. */
+        /* Depth first, OV_SIDES groups at a time. pending[l] has a bit for each box of the current
+         * groups of level l that is still to be visited. */
         uint pending[OV_LEVELS], one[OV_LEVELS], other[OV_LEVELS];
         int level = levels - 1;
         one[level] = other[level] = 0;
@@ -163,13 +183,15 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
         while (level < levels) {
             if (fresh) {
                 const size_t base = first_group[level];
-                const uint2 bits =
+                uint bits =
                     ov_test_groups(t, boxes + (base + one[level]) * (6 * OV_GROUP),
                                    boxes + (base + other[level]) * (6 * OV_GROUP), skin + t.skin);
-                pending[level] = bits.x | (one[level] == other[level] ? 0 : bits.y << OV_GROUP);
+                if (one[level] == other[level])
+                    bits &= (1u << OV_GROUP) - 1u;
+                pending[level] = bits;
                 fresh = false;
                 if (level == 0) {
-                    for (uint k = 0; k < 2; ++k) {
+                    for (uint k = 0; k < OV_SIDES; ++k) {
                         const uint own =
                             k == 0 ? pending[0] & ((1u << OV_GROUP) - 1u) : pending[0] >> OV_GROUP;
                         const uint group = k == 0 ? one[0] : other[0];
@@ -205,7 +227,7 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
             pending[level] &= pending[level] - 1;
             const uint child = (j < OV_GROUP ? one : other)[level] * OV_GROUP + j % OV_GROUP;
             uint sibling = child;
-            if (pending[level] != 0) {
+            if (OV_SIDES == 2 && pending[level] != 0) {
                 const uint i = ov_lowest(pending[level]);
                 pending[level] &= pending[level] - 1;
                 sibling = (i < OV_GROUP ? one : other)[level] * OV_GROUP + i % OV_GROUP;

@@ -82,7 +82,7 @@ static inline ov_test ov_least_aligned(const ov_term t, const ov_boxes b) {
 }
 
 /* A lower bound of q over the boxes. */
-static inline ov_test ov_least(const ov_term t, const ov_boxes b) {
+static inline ov_test ov_lower_bound(const ov_term t, const ov_boxes b) {
     const ov_test zero = 0.0f;
     const float ix = -0.5f / t.xx, iy = -0.5f / t.yy, iz = -0.5f / t.zz;
     ov_test x, y = ov_within(zero, b.ly, b.hy), z = ov_within(zero, b.lz, b.hz);
@@ -118,8 +118,8 @@ static inline uint ov_test_groups(const ov_term t, __global const float *one,
         least_first = ov_least_aligned(t, first);
         least_second = ov_least_aligned(t, second);
     } else {
-        least_first = ov_least(t, first);
-        least_second = ov_least(t, second);
+        least_first = ov_lower_bound(t, first);
+        least_second = ov_lower_bound(t, second);
     }
     return ov_reached(t, first, least_first) | ov_reached(t, second, least_second) << OV_GROUP;
 #else
@@ -131,7 +131,7 @@ static inline uint ov_test_groups(const ov_term t, __global const float *one,
         if (aligned)
             least = ov_least_aligned(t, b);
         else
-            least = ov_least(t, b);
+            least = ov_lower_bound(t, b);
         bits |= ov_reached(t, b, least) << (v * OV_TEST);
     }
     return bits;

@@ -35,6 +35,7 @@ static inline float ov_least(ov_wide a) {
     const float2 two = min(four.lo, four.hi);
     return min(two.x, two.y);
 }
+#undef OV_FOLD
 
 /* Squared length of w - s u - t v. */
 static inline ov_wide ov_residue(const ov_wide *w, const ov_wide *u, const ov_wide *v, ov_wide s,

@@ -200,3 +200,7 @@ __kernel void gram(const uint count, __global const float *restrict points,
     }
 #endif
 }
+
+/* Other files have their own. */
+#undef OV_TILE_PACKS
+#undef OV_FLUSH_TILES

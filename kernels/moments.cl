@@ -41,9 +41,10 @@ OV_FOLD(ov_fold8, float8, float4)
 OV_FOLD(ov_fold4, float4, float2)
 OV_FOLD(ov_fold2, float2, float)
 #endif
+#undef OV_FOLD
 
 /* Sum of a pair of vectors as a pair of scalars. */
-static inline void ov_sum(ov_vec high, ov_vec low, float *high_sum, float *low_sum) {
+static inline void ov_sum_both(ov_vec high, ov_vec low, float *high_sum, float *low_sum) {
 #if OV_VECTOR == 1
     *high_sum = high;
     *low_sum = low;
@@ -161,7 +162,7 @@ __kernel void moments(const uint count, __global const float *restrict points,
     for (uint m = 0; m < OV_MONOMIALS; ++m) {
         ov_add(&total[m], &rest[m], sum[m]);
         float high, low;
-        ov_sum(total[m], rest[m], &high, &low);
+        ov_sum_both(total[m], rest[m], &high, &low);
 #if OV_SHARERS > 1
         ov_add_team(&high, &low, sharer, scratch);
         if (sharer == 0)
@@ -172,3 +173,7 @@ __kernel void moments(const uint count, __global const float *restrict points,
         }
     }
 }
+
+/* Other files have their own. */
+#undef OV_TILE_PACKS
+#undef OV_FLUSH_TILES

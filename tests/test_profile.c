@@ -247,11 +247,16 @@ static void waiting_reads_the_times(void **state) {
     ovoid_context *context = new_context();
     ov_buffer buffer = {0};
     uint32_t word = 0;
+    const size_t many = (size_t)4 << 20;
+    void *bytes = calloc(1, many);
+    assert_non_null(bytes);
     test_check(context, ovoid_context_profile(context, true));
-    test_check(context, ov_buffer_reserve(context, &buffer, sizeof word, "a word"));
+    test_check(context, ov_buffer_reserve(context, &buffer, many, "bytes"));
     launch(context, 2);
     assert_int_equal(driver.released, 0);
     test_check(context, ov_buffer_write(context, &buffer, 0, &word, sizeof word));
+    assert_int_equal(driver.released, 0); /* a small write does not wait */
+    test_check(context, ov_buffer_write(context, &buffer, 0, bytes, many));
     assert_int_equal(driver.released, 2);
     launch(context, 3);
     test_check(context, ov_buffer_read(context, &buffer, 0, &word, sizeof word));
@@ -263,6 +268,7 @@ static void waiting_reads_the_times(void **state) {
     ov_buffer_destroy(&buffer);
     ovoid_context_destroy(&context);
     assert_int_equal(driver.released, 10);
+    free(bytes);
 }
 
 static void few_events_are_kept(void **state) {

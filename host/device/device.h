@@ -39,6 +39,8 @@ typedef struct ov_device {
     uint32_t loaded;             /* programs taken from the cache so far */
     bool cache_told;             /* the user knows that the cache does not work */
     struct ov_profile *profile;  /* times of kernels; NULL until ovoid_context_profile() */
+    unsigned char *staged;       /* copies of small writes under way; NULL before the first */
+    size_t staged_bytes;
 } ov_device;
 
 /* The context's device, opening the default one if none is open yet. */
@@ -58,7 +60,9 @@ typedef struct ov_kernel {
 
 /* Makes the kernel `name` of kernels/<program>.cl, building that program on the first request (from
  * the embedded source, or from the folder OVOID_KERNEL_DIR when that is set) and keeping it with
- * the device. Build options: -cl-std=CL1.2, the shape, -DOV_PACK, and never a relaxed-math flag. */
+ * the device. On PoCL all embedded files are built as one program: no two kernels, functions or
+ * macros of theirs may share a name. Build options: -cl-std=CL1.2, the shape, -DOV_PACK, and never
+ * a relaxed-math flag. */
 ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const char *name,
                               ov_kernel *kernel);
 void ov_kernel_destroy(ov_kernel *kernel);
@@ -97,7 +101,8 @@ ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t
                                const char *what);
 void ov_buffer_destroy(ov_buffer *buffer);
 
-/* Copies between host and device, waiting for the end. bytes == 0 does nothing. */
+/* Copies between host and device; `data` is free to change, or whole, on return. A read waits for
+ * all that was enqueued; a small write does not. bytes == 0 does nothing. */
 ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t offset,
                              const void *data, size_t bytes);
 ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, size_t offset,

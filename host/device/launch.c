@@ -1,6 +1,7 @@
 #include "device/internal.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 /* ---- launches ----------------------------------------------------------------------------- */
 
@@ -57,12 +58,17 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     return OVOID_OK;
 }
 
+/* What can be done when everything enqueued has run. */
+static ovoid_status idle(ovoid_context *context) {
+    context->device->staged_bytes = 0;
+    return ov_profile_drain(context, context->device);
+}
+
 ovoid_status ov_finish(ovoid_context *context) {
     if (!context->device)
         return OVOID_OK;
     cl_int code = clFinish(context->device->queue);
-    return code == CL_SUCCESS ? ov_profile_drain(context, context->device)
-                              : ov_cl_fail(context, code, "clFinish", NULL);
+    return code == CL_SUCCESS ? idle(context) : ov_cl_fail(context, code, "clFinish", NULL);
 }
 
 /* ---- buffers ------------------------------------------------------------------------------ */
@@ -119,6 +125,21 @@ void ov_buffer_destroy(ov_buffer *buffer) {
     *buffer = (ov_buffer){0};
 }
 
+/* A copy of the data that stays until the queue is idle; NULL when there is no room, and it has to
+ * be written at once. Waiting for each of a fit's thousand writes, a few hundred bytes most of
+ * them, would let the device run dry each time. */
+#define STAGE_BYTES ((size_t)1 << 20)
+static const void *stage(ov_device *device, const void *data, size_t bytes) {
+    if (bytes > STAGE_BYTES - device->staged_bytes)
+        return NULL;
+    if (!device->staged && !(device->staged = malloc(STAGE_BYTES)))
+        return NULL;
+    void *copy = device->staged + device->staged_bytes;
+    memcpy(copy, data, bytes);
+    device->staged_bytes += bytes;
+    return copy;
+}
+
 static ovoid_status check_range(ovoid_context *context, const ov_buffer *buffer, size_t offset,
                                 size_t bytes) {
     if (!context->device || offset > buffer->bytes || bytes > buffer->bytes - offset)
@@ -135,10 +156,13 @@ ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t o
     ovoid_status status = check_range(context, buffer, offset, bytes);
     if (status != OVOID_OK)
         return status;
-    cl_int code = clEnqueueWriteBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
-                                       bytes, data, 0, NULL, NULL);
-    return code == CL_SUCCESS ? ov_profile_drain(context, context->device)
-                              : ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
+    const void *copy = stage(context->device, data, bytes);
+    cl_int code =
+        clEnqueueWriteBuffer(context->device->queue, buffer->memory, copy ? CL_FALSE : CL_TRUE,
+                             offset, bytes, copy ? copy : data, 0, NULL, NULL);
+    if (code != CL_SUCCESS)
+        return ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
+    return copy ? OVOID_OK : idle(context);
 }
 
 ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, size_t offset,
@@ -150,6 +174,6 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
         return status;
     cl_int code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
                                       bytes, data, 0, NULL, NULL);
-    return code == CL_SUCCESS ? ov_profile_drain(context, context->device)
+    return code == CL_SUCCESS ? idle(context)
                               : ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
 }

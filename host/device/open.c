@@ -218,6 +218,7 @@ static void release(ov_device *device) {
     }
     if (device->context)
         clReleaseContext(device->context);
+    free(device->staged);
     free(device);
 }
 

@@ -157,37 +157,51 @@ cleanup:
     return status;
 }
 
+static bool may_merge(const ov_merging *how, uint32_t i, uint32_t j) {
+    return !(how->twin && how->twin[i] == j) && !(how->fixed && (how->fixed[i] || how->fixed[j]));
+}
+
+/* Moves those that are left together. partner[i]: whom i took in or was taken in by, UINT32_MAX:
+ * nobody; the one with the larger index is gone. */
+static size_t close_gaps(const uint32_t *partner, size_t count, double *x, uint32_t *parents) {
+    size_t kept = 0;
+    for (size_t i = 0; i < count; ++i) {
+        if (partner[i] < i)
+            continue;
+        memmove(x + OV_FACTOR_PARAMETERS * kept, x + OV_FACTOR_PARAMETERS * i,
+                OV_FACTOR_PARAMETERS * sizeof *x);
+        if (parents) {
+            parents[2 * kept] = (uint32_t)i;
+            parents[2 * kept + 1] = partner[i];
+        }
+        ++kept;
+    }
+    return kept;
+}
+
 /* Merges the first pairs of the list, no ellipsoid twice, and closes the gaps. */
 static ovoid_status apply_merges(ovoid_context *context, const ov_component *components,
-                                 const candidate *list, size_t listed, const uint32_t *twin,
+                                 const candidate *list, size_t listed, const ov_merging *how,
                                  double *x, size_t *count, size_t fewer) {
-    bool *const used = ov_alloc(context, *count, sizeof *used, "merges");
-    bool *const gone = ov_alloc(context, *count, sizeof *gone, "merges");
-    if (!used || !gone) {
-        free(used);
-        free(gone);
+    uint32_t *const partner = ov_alloc(context, *count, sizeof *partner, "merges");
+    if (!partner)
         return OVOID_ERROR_MEMORY;
-    }
+    memset(partner, 0xff, *count * sizeof *partner);
     for (size_t n = 0; n < listed && fewer > 0; ++n) {
-        const uint32_t i = list[n].i, j = list[n].j;
-        if (used[i] || used[j] || (twin && twin[i] == j))
+        const uint32_t i = list[n].i, j = list[n].j; /* i < j */
+        if (partner[i] != UINT32_MAX || partner[j] != UINT32_MAX || !may_merge(how, i, j))
             continue;
         ov_component both;
         ov_quadric quadric;
         ov_component_merge(&components[i], &components[j], &both);
         ov_quadric_of_component(&both, &quadric);
         ov_factor_of_quadric(&quadric, x + i * OV_FACTOR_PARAMETERS);
-        used[i] = used[j] = gone[j] = true;
+        partner[i] = j;
+        partner[j] = i;
         --fewer;
     }
-    size_t kept = 0;
-    for (size_t i = 0; i < *count; ++i)
-        if (!gone[i])
-            memmove(x + OV_FACTOR_PARAMETERS * kept++, x + OV_FACTOR_PARAMETERS * i,
-                    OV_FACTOR_PARAMETERS * sizeof *x);
-    *count = kept;
-    free(used);
-    free(gone);
+    *count = close_gaps(partner, *count, x, how->parents);
+    free(partner);
     return OVOID_OK;
 }
 
@@ -206,18 +220,19 @@ static ovoid_status components_of(ovoid_context *context, const double *x, size_
 }
 
 ovoid_status ov_merge_cheapest(ov_refiner *r, ov_merger *m, const ov_target *target, double *x,
-                               size_t *count, size_t fewer, const uint32_t *twin) {
+                               size_t *count, size_t fewer, const ov_merging *how) {
+    static const ov_merging anyhow = {NULL, NULL, NULL};
     ovoid_status status = OVOID_OK;
     ov_component *components = NULL;
     candidate *list = NULL;
     size_t listed = 0;
     OV_TRY(components_of(r->context, x, *count, &components));
     OV_TRY(list_candidates(r->context, components, *count, &list, &listed));
-    if (listed == 0)
-        goto cleanup;
-    OV_TRY(find_losses(r, m, target, components, list, listed));
+    if (listed > 0)
+        OV_TRY(find_losses(r, m, target, components, list, listed));
     qsort(list, listed, sizeof *list, by_loss);
-    OV_TRY(apply_merges(r->context, components, list, listed, twin, x, count, fewer));
+    OV_TRY(
+        apply_merges(r->context, components, list, listed, how ? how : &anyhow, x, count, fewer));
 cleanup:
     free(components);
     free(list);

@@ -14,11 +14,19 @@ typedef struct ov_merger {
 } ov_merger;
 void ov_merger_destroy(ov_merger *merger);
 
+/* How to merge; NULL and NULL members: as one likes. */
+typedef struct ov_merging {
+    const uint32_t *twin; /* ellipsoid i is not merged with twin[i] */
+    const bool *fixed;    /* and not at all if fixed[i] */
+    uint32_t *parents;    /* gets two for each ellipsoid left: the indices of those that became it,
+                             UINT32_MAX in place of the second where it is one as before */
+} ov_merging;
+
 /* Merges pairs, the cheapest first and no ellipsoid twice, until *count has gone down by `fewer` or
- * no pair is left, and closes the gaps: the others keep their order. An ellipsoid i is not merged
- * with twin[i]; twin may be NULL. The refiner has evaluated x last. */
+ * no pair is left, and closes the gaps: the others keep their order. The refiner has evaluated x
+ * last. */
 ovoid_status ov_merge_cheapest(ov_refiner *refiner, ov_merger *merger, const ov_target *target,
-                               double *x, size_t *count, size_t fewer, const uint32_t *twin);
+                               double *x, size_t *count, size_t fewer, const ov_merging *how);
 
 /* Splits the `more` ellipsoids with most misfit after the `skip` worst of all, or those there are,
  * along their longest axes into halves that together keep mass, mean and covariance: one in the

@@ -222,6 +222,11 @@ cleanup:
     return status;
 }
 
+void ov_refiner_forget(ov_refiner *r) {
+    r->now.listed_points = r->tried.listed_points = NULL;
+    r->now.listed_count = r->tried.listed_count = 0;
+}
+
 static void destroy_evaluation(ov_evaluation *e) {
     ov_terms_destroy(&e->terms);
     ov_lists_destroy(&e->lists);

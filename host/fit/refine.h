@@ -56,6 +56,8 @@ ovoid_status ov_refine(ov_refiner *refiner, const ov_target *target,
 /* The misfit at x; the model's values at the points stay in refiner->now. */
 ovoid_status ov_refine_evaluate(ov_refiner *refiner, const ov_target *target, const double *x,
                                 size_t count, double *misfit);
+/* To be called when points that it has seen are replaced by others in the same place. */
+void ov_refiner_forget(ov_refiner *refiner);
 void ov_refiner_destroy(ov_refiner *refiner);
 
 #endif

@@ -1,0 +1,207 @@
+/*
+ * The accuracy step of some ellipsoids: the others keep their bits, the misfit of the whole falls
+ * by what that of the part does, and the points left out do not matter.
+ */
+#include "fit/local.h"
+#include "scene.h"
+
+enum { P = OV_FACTOR_PARAMETERS };
+
+/* A row of ellipsoids, so that one end hardly knows of the other, and its target. */
+typedef struct row {
+    scene s;
+    double *x; /* off by a little */
+} row;
+
+static void row_create(row *r, ovoid_context *context, size_t count, uint64_t seed) {
+    test_random random = {seed};
+    ov_target_options options;
+    ov_target_options_init(&options);
+    ov_quadric *const quadrics = scene_ellipsoids(&random, count);
+    for (size_t i = 0; i < count; ++i) {
+        quadrics[i].centre[0] = 2.5 * (double)i;
+        quadrics[i].centre[1] *= 0.2;
+        quadrics[i].centre[2] *= 0.2;
+    }
+    scene_create(&r->s, context, quadrics, count, 0.5, 1.0, test_size(7, 16) / 10.0,
+                 test_small() ? 3.0 : 4.5, &options);
+    r->x = test_alloc(count * P, sizeof *r->x);
+    for (size_t i = 0; i < count; ++i) {
+        ov_factor_of_quadric(&quadrics[i], r->x + i * P);
+        for (int k = 0; k < P; ++k)
+            r->x[i * P + (size_t)k] += 0.1 * random_uniform(&random, -1.0, 1.0);
+    }
+    test_check(context, ov_target_emphasise(context, &r->s.target, quadrics->centre,
+                                            sizeof *quadrics, 1, 3.0, 2.0));
+    free(quadrics);
+}
+
+static void row_destroy(row *r) {
+    scene_destroy(&r->s);
+    free(r->x);
+}
+
+static double *copy_of(const row *r) {
+    double *const copy = test_alloc(r->s.count * P, sizeof *copy);
+    memcpy(copy, r->x, r->s.count * P * sizeof *copy);
+    return copy;
+}
+
+static ov_refine_options options_of(uint32_t steps) {
+    return (ov_refine_options){.steps = steps,
+                               .solver_steps = (uint32_t)test_size(40, 4),
+                               .solver_tolerance = 1e-2,
+                               .damping = 1e-2,
+                               .width_max = 30.0};
+}
+
+static double misfit_of_all(const row *r, const double *x) {
+    ov_refiner refiner = {.context = r->s.context};
+    double misfit;
+    test_check(r->s.context, ov_refine_evaluate(&refiner, &r->s.target, x, r->s.count, &misfit));
+    ov_refiner_destroy(&refiner);
+    return misfit;
+}
+
+static double refine_some(ov_local *local, const row *r, uint32_t steps, const bool *chosen,
+                          double *x) {
+    const ov_refine_options options = options_of(steps);
+    double misfit = NAN;
+    test_check(r->s.context,
+               ov_refine_some(local, &r->s.target, &options, x, r->s.count, chosen, &misfit));
+    return misfit;
+}
+
+/* ---- tests -------------------------------------------------------------------------------- */
+
+/* One end, then the other with the same structure, as growing does at one spot after another. */
+static void the_others_stay_and_the_whole_gains(void **state) {
+    row r;
+    ov_local local = {.refiner = {.context = *state}};
+    row_create(&r, *state, test_size(12, 4), 1);
+    const size_t count = r.s.count, some = count / 3;
+    bool *const chosen = test_alloc(count, sizeof *chosen);
+    double *const x = copy_of(&r);
+    for (size_t first = 0; first < count; first += count - some) {
+        double *const before = copy_of(&r);
+        memcpy(before, x, count * P * sizeof *x);
+        for (size_t i = 0; i < count; ++i)
+            chosen[i] = i >= first && i < first + some;
+        const double all_before = misfit_of_all(&r, x);
+        const double some_before = refine_some(&local, &r, 0, chosen, x);
+        assert_memory_equal(x, before, count * P * sizeof *x); /* no step yet */
+        const double some_after = refine_some(&local, &r, (uint32_t)test_size(12, 3), chosen, x);
+        const double all_after = misfit_of_all(&r, x);
+        print_message("%zu of %zu packs, misfit %g -> %g, of the whole %g -> %g\n",
+                      local.points.packs, r.s.samples.points.packs, some_before, some_after,
+                      all_before, all_after);
+        for (size_t i = 0; i < count; ++i)
+            assert_true(chosen[i] == (memcmp(x + i * P, before + i * P, P * sizeof *x) != 0));
+        assert_true(some_after < (test_small() ? 0.9 : 0.5) * some_before);
+        assert_true(local.points.packs < r.s.samples.points.packs || test_small());
+        expect_near(all_after - all_before, some_after - some_before, 1e-3 * all_before,
+                    "what the whole gained");
+        free(before);
+    }
+    free(chosen);
+    free(x);
+    ov_local_destroy(&local);
+    row_destroy(&r);
+}
+
+/* Where it has been before, with ellipsoids and packs a little elsewhere. */
+static void a_second_time_equals_a_first(void **state) {
+    row r;
+    ov_local local = {.refiner = {.context = *state}}, fresh = {.refiner = {.context = *state}};
+    row_create(&r, *state, test_size(9, 4), 5);
+    bool *const chosen = test_alloc(r.s.count, sizeof *chosen);
+    for (size_t i = 0; i < r.s.count; ++i)
+        chosen[i] = i < 3;
+    refine_some(&local, &r, 0, chosen, r.x);
+    for (size_t i = 0; i < 3; ++i)
+        r.x[i * P + OV_FACTOR_CENTRE + 1] += 0.25;
+    const double again = refine_some(&local, &r, 0, chosen, r.x);
+    assert_true(again == refine_some(&fresh, &r, 0, chosen, r.x));
+    free(chosen);
+    ov_local_destroy(&local);
+    ov_local_destroy(&fresh);
+    row_destroy(&r);
+}
+
+/* All of them: the same as without choosing, but for the order of sums. */
+static void all_chosen_is_everything(void **state) {
+    row r;
+    ov_local local = {.refiner = {.context = *state}};
+    ov_refiner refiner = {.context = *state};
+    const ov_refine_options options = options_of(2);
+    double wanted;
+    row_create(&r, *state, test_size(6, 3), 2);
+    bool *const chosen = test_alloc(r.s.count, sizeof *chosen);
+    memset(chosen, true, r.s.count * sizeof *chosen);
+    double *const x = copy_of(&r);
+    const double got = refine_some(&local, &r, 2, chosen, x);
+    test_check(*state, ov_refine(&refiner, &r.s.target, &options, r.x, r.s.count, &wanted));
+    expect_near(got, wanted, 1e-3 * wanted, "the misfit");
+    for (size_t j = 0; j < r.s.count * P; ++j)
+        expect_near(x[j], r.x[j], 1e-3, "a parameter");
+    free(chosen);
+    free(x);
+    ov_local_destroy(&local);
+    ov_refiner_destroy(&refiner);
+    row_destroy(&r);
+}
+
+/* Nobody, or one that reaches no point: nothing to do. */
+static void none_chosen_changes_nothing(void **state) {
+    row r;
+    ov_local local = {.refiner = {.context = *state}};
+    row_create(&r, *state, 3, 3);
+    bool chosen[3] = {false, false, false};
+    double *const x = copy_of(&r);
+    assert_true(refine_some(&local, &r, 3, chosen, x) == 0.0);
+    assert_memory_equal(x, r.x, r.s.count * P * sizeof *x);
+    chosen[1] = true;
+    x[P + OV_FACTOR_CENTRE] = 500.0;
+    assert_true(refine_some(&local, &r, 3, chosen, x) == 0.0);
+    assert_true(x[P + OV_FACTOR_CENTRE] == 500.0);
+    free(x);
+    ov_local_destroy(&local);
+    ov_local_destroy(&local); /* again */
+    row_destroy(&r);
+}
+
+static bool stop(uint32_t step, double misfit, void *user) {
+    (void)step;
+    (void)misfit;
+    (void)user;
+    return false;
+}
+
+static void cancelling_leaves_all_as_it_was(void **state) {
+    row r;
+    ov_local local = {.refiner = {.context = *state}};
+    ov_refine_options options = options_of(5);
+    const bool chosen[3] = {true, false, false};
+    double misfit;
+    options.go_on = stop;
+    row_create(&r, *state, 3, 4);
+    double *const x = copy_of(&r);
+    test_refused(*state,
+                 ov_refine_some(&local, &r.s.target, &options, x, r.s.count, chosen, &misfit),
+                 OVOID_ERROR_CANCELLED, "stopped while refining");
+    assert_memory_equal(x, r.x, r.s.count * P * sizeof *x);
+    free(x);
+    ov_local_destroy(&local);
+    row_destroy(&r);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_others_stay_and_the_whole_gains),
+        cmocka_unit_test(a_second_time_equals_a_first),
+        cmocka_unit_test(all_chosen_is_everything),
+        cmocka_unit_test(none_chosen_changes_nothing),
+        cmocka_unit_test(cancelling_leaves_all_as_it_was),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -23,16 +23,19 @@ static bool report_sampling(uint64_t points, void *user) {
     return !f->options->progress || f->options->progress(&progress, f->options->user);
 }
 
-/* Small molecules have few points at any spacing, and so few that more of them help. */
-static double default_spacing(size_t atoms) {
+/* Small molecules have few points at any spacing, and so few that more of them help. The field of
+ * a larger decay rate has smaller features; that of a smaller one has fewer, and as many points. */
+static double default_spacing(size_t atoms, double decay) {
     const double small = SPACING_SMALL * pow((double)atoms / ATOMS_SMALL, 0.25);
-    return fmin(fmax(small, SPACING_SMALL), OVOID_DEFAULT_SPACING_ADAPTIVE);
+    return fmin(fmax(small, SPACING_SMALL), OVOID_DEFAULT_SPACING_ADAPTIVE) *
+           fmin(1.0, sqrt(0.5 / decay));
 }
 
 static ovoid_status prepare(ov_adaptive *f) {
     ovoid_status status = OVOID_OK;
     const ovoid_fit_options *const options = f->options;
-    f->spacing = options->spacing > 0.0 ? options->spacing : default_spacing(f->atoms);
+    f->spacing =
+        options->spacing > 0.0 ? options->spacing : default_spacing(f->atoms, options->decay);
     double radius = 0.0;
     ov_target_options targets;
     ov_lattice lattice;

@@ -4,11 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Ellipsoids per atom that a tolerance of 1 angstrom asks for, about, and how the number goes with
- * the tolerance. Only the start of the search: growing from too few ends with fewer than shrinking
- * from too many. */
+/* Ellipsoids per atom that a tolerance of 1 angstrom asks for at d = 0.5, about, and how the number
+ * goes with the tolerance and the decay rate. Only the start of the search: growing from too few
+ * ends with fewer than shrinking from too many. */
 #define RATIO_AT_ONE 0.04
 #define RATIO_POWER -0.95
+#define RATIO_DECAY 1.25
 /* Growing: rounds at most, how far apart the spots are that are split (angstrom), and the largest
  * share of ellipsoids split at once. */
 #define GROW_ROUNDS 10
@@ -337,7 +338,8 @@ cleanup:
 /* Where growing gets stuck: another start with more ellipsoids; in the end the atoms. */
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best) {
     ovoid_status status = OVOID_OK;
-    const double guess = RATIO_AT_ONE * pow(tolerance, RATIO_POWER) * (double)f->atoms;
+    const double guess = RATIO_AT_ONE * pow(tolerance, RATIO_POWER) *
+                         pow(f->options->decay / 0.5, RATIO_DECAY) * (double)f->atoms;
     size_t count = (size_t)fmin(fmax(round(guess), 1.0), (double)f->atoms);
     bool reached = false;
     while (!reached && count < f->atoms) {

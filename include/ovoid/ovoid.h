@@ -274,7 +274,9 @@ OVOID_API ovoid_status ovoid_model_field(ovoid_context *context, const ovoid_mod
 /* ---- fitting ------------------------------------------------------------------------------ */
 
 /* Of the constrained points, angstrom. */
-#define OVOID_DEFAULT_SPACING_ADAPTIVE 0.7 /* less for molecules of less than 640 atoms */
+#define OVOID_DEFAULT_SPACING_ADAPTIVE                                                             \
+    0.7 /* less for molecules of less than 640 atoms, and times                                    \
+           sqrt(0.5 / decay) for decays above 0.5 */
 #define OVOID_DEFAULT_SPACING_L1 0.8
 
 typedef enum ovoid_method {

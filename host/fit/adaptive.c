@@ -151,7 +151,7 @@ static ovoid_status finish(ov_adaptive *f, ov_trial *best, ovoid_ellipsoid **ell
     result->points = f->samples.points.count;
     result->ellipsoids = best->count;
     result->iterations = f->steps;
-    result->solver_iterations = f->refiner.solver.iterations;
+    result->solver_iterations = f->refiner.solver.iterations + f->local.refiner.solver.iterations;
     result->distance = judgement.valid ? judgement.deviation : NAN;
     result->reached = wanted->goal != OVOID_GOAL_TOLERANCE || !f->judge.mesh ||
                       (judgement.valid && judgement.deviation <= wanted->tolerance);

@@ -103,10 +103,11 @@ static inline void ov_box_distances(float px, float py, float pz, __global const
     }
 }
 
-/* Squared distance to the nearest triangle if that is below `bound`, else bound. */
+/* Squared distance to the nearest triangle of the leaves from first to end if that is below
+ * `bound`, else bound. triangles: of these leaves. */
 static inline float ov_nearest(float px, float py, float pz, float bound, int levels,
-                               const uint *first_group, __global const float *boxes,
-                               __global const float *triangles) {
+                               const uint *first_group, __global const float *boxes, uint first,
+                               uint end, __global const float *triangles) {
     float distance[OV_LEVELS * OV_GROUP];      /* of the boxes of each level's current group */
     uint pending[OV_LEVELS], group[OV_LEVELS]; /* a bit for each of them still to be visited */
     int level = levels - 1;
@@ -120,6 +121,11 @@ static inline float ov_nearest(float px, float py, float pz, float bound, int le
             uint bits = 0;
             for (uint j = 0; j < OV_GROUP; ++j)
                 bits |= own[j] < bound ? 1u << j : 0u;
+            /* Of them, those of this level that hold some of the leaves. */
+            const uint low = first >> (OV_GROUP_BITS * level),
+                       high = (end - 1) >> (OV_GROUP_BITS * level), from = group[level] * OV_GROUP;
+            bits &= ~0u << (low > from ? low - from : 0u);
+            bits &= (2u << min(high - from, OV_GROUP - 1u)) - 1u;
             pending[level] = bits;
         }
         float least = bound;
@@ -139,9 +145,9 @@ static inline float ov_nearest(float px, float py, float pz, float bound, int le
         pending[level] &= ~(1u << nearest);
         const uint child = group[level] * OV_GROUP + nearest;
         if (level == 0) {
-            bound =
-                min(bound, ov_leaf_distance(px, py, pz,
-                                            triangles + (size_t)child * (OV_TRIANGLE * OV_LEAF)));
+            bound = min(bound, ov_leaf_distance(px, py, pz,
+                                                triangles + (size_t)(child - first) *
+                                                                (OV_TRIANGLE * OV_LEAF)));
         } else {
             group[--level] = child;
             fresh = true;
@@ -150,13 +156,16 @@ static inline float ov_nearest(float px, float py, float pz, float bound, int le
     return bound;
 }
 
-/* squared[k] = squared distance of point k, xyz[3 * k + {0, 1, 2}], for `each` consecutive points
- * per work-item: what one of them has found bounds the distance of the next. Infinite beyond what a
- * float holds. */
+/* squared[k] = squared distance of point k, xyz[3 * k + {0, 1, 2}], to the leaves from first_leaf
+ * to end_leaf, which lie between low and high and whose triangles are given; with use_bound to them
+ * or what squared[k] was before, whichever is less. For `each` consecutive points per work-item:
+ * what one of them has found bounds the distance of the next. Infinite beyond what a float holds.
+ */
 __kernel void distances(const uint count, const uint each, __global const float *restrict xyz,
                         const ov_tree tree, __global const float *restrict boxes,
-                        __global const float *restrict triangles,
-                        __global float *restrict squared) {
+                        const uint first_leaf, const uint end_leaf, const float4 low,
+                        const float4 high, __global const float *restrict triangles,
+                        const uint use_bound, __global float *restrict squared) {
     /* A copy, made where all work-items still run together: see lists.cl. */
     const int levels = (int)tree.levels;
     uint first_group[OV_LEVELS];
@@ -171,13 +180,22 @@ __kernel void distances(const uint count, const uint each, __global const float 
         z = xyz[3 * k + 2];
         /* The triangle found before is at most this far; the factor stands for rounding. */
         const float reach = (sqrt(bound) + sqrt(fma(dx, dx, fma(dy, dy, dz * dz)))) * 1.00001f;
-        float limit = fma(reach, reach, FLT_MIN);
+        const float most = use_bound ? squared[k] : INFINITY;
+        const float bx = max(max(low.x - x, x - high.x), 0.0f),
+                    by = max(max(low.y - y, y - high.y), 0.0f),
+                    bz = max(max(low.z - z, z - high.z), 0.0f);
+        if (use_bound && fma(bx, bx, fma(by, by, bz * bz)) >= most) {
+            bound = most;
+            continue;
+        }
+        float limit = min(fma(reach, reach, FLT_MIN), most);
         /* A loop around one call: compilers that inline it do so once. */
         for (;;) {
-            bound = ov_nearest(x, y, z, limit, levels, first_group, boxes, triangles);
-            if (bound < limit || limit == INFINITY)
+            bound = ov_nearest(x, y, z, limit, levels, first_group, boxes, first_leaf, end_leaf,
+                               triangles);
+            if (bound < limit || limit == most)
                 break;
-            limit = INFINITY;
+            limit = most;
         }
         squared[k] = bound;
     }

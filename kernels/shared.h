@@ -25,6 +25,7 @@ typedef float ov_f32;
 #define OV_BRICK_Z 2
 /* Boxes in a group of the tree over packs or terms, and levels of that tree (16^7 leaves). */
 #define OV_GROUP 16
+#define OV_GROUP_BITS 4 /* its logarithm */
 #define OV_LEVELS 7
 /* What lists are made of (kernels/lists.cl): entries in a chunk, and bins for the entries of a
  * group. The more bins, the fewer entries come to lie in disorder. */

@@ -16,18 +16,28 @@ static ovoid_distances distances(ovoid_context *context, const shape *a, const s
     return result;
 }
 
-/* Distances of points from triangles given as arrays. */
+/* Distances of points from triangles given as arrays, all at once and in chunks and batches. */
 static void expect_distances(ovoid_context *context, const double *xyz, size_t vertices,
                              const uint32_t *corners, size_t triangles, const float *points,
                              size_t count, double tolerance) {
     static const double origin[3] = {0.0, 0.0, 0.0};
+    static const size_t chunks[] = {16, 17, 33, 40};
     ovoid_mesh *mesh = NULL;
+    ov_trail trail = {0};
     ov_facets facets = {0};
+    const ov_sites sites = {.count = count, .xyz = points};
     float *const squared = test_alloc(count, sizeof *squared);
+    float *const again = test_alloc(count, sizeof *again);
     test_check(context, ovoid_mesh_create(context, xyz, NULL, vertices, corners, triangles, &mesh));
-    test_check(context, ov_facets_create(context, mesh, false,
-                                         OV_FACETS_TRIANGLES | OV_FACETS_POINTS, origin, &facets));
-    test_check(context, ov_facets_distances(context, &facets, points, count, squared));
+    test_check(context, ov_trail_create(context, mesh, false, &trail));
+    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    test_check(context, ov_facets_distances(context, &facets, &sites, squared));
+    for (size_t n = 0; n < sizeof chunks / sizeof *chunks; ++n) {
+        facets.chunk = chunks[n];
+        facets.batch = count / (n + 1) + n;
+        test_check(context, ov_facets_distances(context, &facets, &sites, again));
+        assert_memory_equal(again, squared, count * sizeof *squared);
+    }
     double worst = 0.0;
     for (size_t k = 0; k < count; ++k) {
         const double point[3] = {points[3 * k], points[3 * k + 1], points[3 * k + 2]};
@@ -39,8 +49,10 @@ static void expect_distances(ovoid_context *context, const double *xyz, size_t v
         worst = fmax(worst, fabs(got - wanted));
     }
     print_message("%zu points, %zu triangles: off by %.2g at most\n", count, triangles, worst);
+    free(again);
     free(squared);
     ov_facets_destroy(&facets);
+    ov_trail_destroy(&trail);
     ovoid_mesh_destroy(&mesh);
 }
 
@@ -60,30 +72,33 @@ static void test_one_triangle(void **state) {
     static const double origin[3] = {0.0, 0.0, 0.0};
     ovoid_context *const context = *state;
     ovoid_mesh *mesh = NULL;
+    ov_trail trail = {0};
     ov_facets facets = {0};
     float points[3 * CASES], squared[CASES];
     for (size_t k = 0; k < CASES; ++k)
         memcpy(points + 3 * k, cases[k].point, sizeof cases[k].point);
     test_check(context, ovoid_mesh_create(context, xyz, NULL, 3, corners, 1, &mesh));
-    test_check(context, ov_facets_create(context, mesh, false,
-                                         OV_FACETS_TRIANGLES | OV_FACETS_POINTS, origin, &facets));
-    assert_int_equal(facets.points, 4);
-    test_check(context, ov_facets_distances(context, &facets, points, CASES, squared));
+    test_check(context, ov_trail_create(context, mesh, false, &trail));
+    assert_int_equal(trail.vertices, 3);
+    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    const ov_sites sites = {.count = CASES, .xyz = points};
+    test_check(context, ov_facets_distances(context, &facets, &sites, squared));
     for (size_t k = 0; k < CASES; ++k) {
         const double got = sqrt((double)squared[k]);
         if (!(fabs(got - cases[k].distance) <= 3e-7 * fmax(1.0, cases[k].distance)))
             fail_msg("case %zu: %.9g instead of %.9g", k, got, cases[k].distance);
     }
     ov_facets_destroy(&facets);
+    ov_trail_destroy(&trail);
     ovoid_mesh_destroy(&mesh);
 }
 
 /* Triangles of every form, points near and far, every number of triangles about a leaf's. */
 static void test_random_triangles(void **state) {
-    static const size_t sizes[] = {1, 2, 15, 16, 17, 100, 256, 257, 1000};
+    static const size_t sizes[] = {1, 2, 15, 16, 17, 100, 256, 257, 1000, 9000};
     test_random random = {7};
     for (size_t n = 0; n < sizeof sizes / sizeof *sizes; ++n) {
-        const size_t triangles = sizes[n], count = test_size(500, 40);
+        const size_t triangles = sizes[n], count = test_size(triangles > 1000 ? 100 : 500, 40);
         if (test_small() && triangles > 300)
             continue;
         double *const xyz = test_alloc(9 * triangles, sizeof *xyz);
@@ -189,8 +204,10 @@ static void test_twin(void **state) {
     shape_add_torus(&s[1], test_size(16, 6), 5.0, 1.0);
     ovoid_mesh *a = shape_mesh(context, &s[0]), *b = shape_mesh(context, &s[1]);
     float *const from_a = test_alloc(a->vertices, sizeof *from_a);
-    for (int outer = 0; outer <= 1; ++outer) {
+    for (int n = 0; n < 4; ++n) {
+        const bool outer = n % 2;
         ovoid_distances got;
+        a->along_curve = b->along_curve = n / 2; /* taken as they are, which is no worse */
         for (size_t v = 0; v < a->vertices; ++v)
             from_a[v] = -1.0f;
         test_check(context, ovoid_mesh_distances(context, a, b, outer, &got, from_a));
@@ -207,6 +224,54 @@ static void test_twin(void **state) {
     ovoid_mesh_destroy(&b);
     shape_destroy(&s[0]);
     shape_destroy(&s[1]);
+}
+
+/* Light meshes far from the origin of coordinates, and a vertex that nobody uses. */
+static void test_vertices(void **state) {
+    ovoid_context *const context = *state;
+    const int level = test_small() ? 1 : 3;
+    const double middle[3] = {90, -80, 70};
+    shape s[2] = {{0}, {0}};
+    ovoid_mesh *full[2], *light[2];
+    shape_add_ellipsoid(&s[0], level, (const double[3]){2, 3, 4}, middle, false);
+    shape_add_sphere(&s[1], level, 3.0, 91, -80, 70);
+    for (int n = 0; n < 2; ++n) {
+        const size_t vertices = s[n].vertices, triangles = s[n].triangles - 7 * (size_t)n;
+        float *const offsets = test_alloc(3 * vertices, sizeof *offsets);
+        float *const normals = test_alloc(3 * vertices, sizeof *normals);
+        uint32_t *const corners = test_alloc(3 * triangles, sizeof *corners);
+        for (size_t k = 0; k < 3 * vertices; ++k) {
+            offsets[k] = (float)(s[n].xyz[k] - middle[k % 3]);
+            s[n].xyz[k] = middle[k % 3] + (double)offsets[k];
+        }
+        memcpy(normals, s[n].normals, 3 * vertices * sizeof *normals);
+        memcpy(corners, s[n].corners, 3 * triangles * sizeof *corners);
+        s[n].triangles = triangles; /* of the last ones' vertices some have none left */
+        full[n] = shape_mesh(context, &s[n]);
+        test_check(context, ov_mesh_adopt_light(context, offsets, middle, normals, vertices,
+                                                corners, triangles, &light[n]));
+    }
+    for (int n = 0; n < 2; ++n) {
+        const ovoid_mesh *const from = light[n], *const to = light[1 - n];
+        float *const got = test_alloc(from->vertices, sizeof *got);
+        bool *const used = test_alloc(from->vertices, sizeof *used);
+        got[0] = NAN;
+        test_check(context, ov_vertex_distances(context, from, to, middle, got));
+        for (size_t k = 0; k < 3 * from->triangles; ++k)
+            used[from->corners[k]] = true;
+        for (size_t v = 0; v < from->vertices; ++v)
+            expect_near(got[v],
+                        used[v] ? reference_mesh_distance(full[n]->xyz + 3 * v, full[1 - n], false)
+                                : 0.0,
+                        3e-6, "distance of a vertex");
+        free(used);
+        free(got);
+    }
+    for (int n = 0; n < 2; ++n) {
+        ovoid_mesh_destroy(&full[n]);
+        ovoid_mesh_destroy(&light[n]);
+        shape_destroy(&s[n]);
+    }
 }
 
 static void test_repeats(void **state) {
@@ -263,7 +328,7 @@ int main(void) {
         cmocka_unit_test(test_one_triangle), cmocka_unit_test(test_random_triangles),
         cmocka_unit_test(test_spheres),      cmocka_unit_test(test_ways),
         cmocka_unit_test(test_twin),         cmocka_unit_test(test_repeats),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_vertices),     cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

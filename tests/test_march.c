@@ -736,6 +736,43 @@ static void two_runs_are_the_same(void **state) {
     free(quadrics);
 }
 
+/* A light mesh is the other one rounded, about an origin of the caller's, one vertex without a
+ * gradient included; every vertex has a triangle. */
+static void light_meshes_are_the_same(void **state) {
+    const double xyzr[8] = {-1.75, 0.0, 0.0, 1.5, 1.75, 0.0, 0.0, 1.5}, at[3] = {0};
+    const double origin[3] = {0.3, -40.0, 7.0};
+    static const uint64_t limit[3] = {16, 16, 16};
+    double c;
+    ovoid_molecule *molecule = NULL;
+    ovoid_mesh *full = NULL, *light = NULL;
+    ov_body bodies[2];
+    test_check(*state, ovoid_molecule_create(*state, xyzr, 2, &molecule));
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, at, 1, &c, NULL));
+    ovoid_molecule_destroy(&molecule);
+    for (size_t i = 0; i < 2; ++i)
+        ov_body_of_atom(xyzr + 4 * i, 0.5, &bodies[i]);
+    const ovoid_mesh_options options = options_of(c, coarse(0.5), OVOID_VERTEX_EXACT);
+    test_check(*state, ov_march(*state, bodies, 2, &options, limit, &full));
+    test_check(*state, ov_march_light(*state, bodies, 2, &options, limit, origin, &light));
+    const size_t vertices = full->vertices, triangles = full->triangles;
+    assert_true(full->along_curve && light->along_curve);
+    assert_null(light->xyz);
+    assert_int_equal(vertices, light->vertices);
+    assert_int_equal(triangles, light->triangles);
+    assert_memory_equal(full->corners, light->corners, 3 * triangles * sizeof *full->corners);
+    bool *const used = test_alloc(vertices, sizeof *used);
+    for (size_t k = 0; k < 3 * triangles; ++k)
+        used[full->corners[k]] = true;
+    for (size_t k = 0; k < 3 * vertices; ++k) {
+        assert_true(used[k / 3]);
+        assert_true(light->offsets[k] == (float)(full->xyz[k] - origin[k % 3]));
+        expect_near(light->normals[k], full->normals[k], 1e-5, "a normal");
+    }
+    free(used);
+    ovoid_mesh_destroy(&full);
+    ovoid_mesh_destroy(&light);
+}
+
 /* ---- a protein ---------------------------------------------------------------------------- */
 
 static bool file_exists(const char *path) {
@@ -850,6 +887,7 @@ int main(void) {
         cmocka_unit_test(pieces_reach_as_far_as_the_surface),
         cmocka_unit_test(tips_at_the_ends_of_pieces),
         cmocka_unit_test(two_runs_are_the_same),
+        cmocka_unit_test(light_meshes_are_the_same),
         cmocka_unit_test(a_protein_is_closed),
         cmocka_unit_test(refusals),
     };

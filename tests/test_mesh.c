@@ -87,6 +87,61 @@ static void test_defects(void **state) {
     shape_destroy(&s);
 }
 
+/* More edges than are looked at at a time. */
+static void test_many_edges(void **state) {
+    shape s = {0};
+    shape_add_torus(&s, 300, 5.0, 1.0);
+    for (int hole = 0; hole < 2; ++hole, --s.triangles) {
+        ovoid_mesh *mesh = shape_mesh(*state, &s);
+        assert_int_equal(ovoid_mesh_components(mesh), 1);
+        assert_true(ovoid_mesh_component(mesh, 0)->closed == !hole);
+        assert_int_equal(ovoid_mesh_component(mesh, 0)->euler, -hole);
+        ovoid_mesh_destroy(&mesh);
+    }
+    shape_destroy(&s);
+}
+
+/* A light mesh says the same, but for its edges. */
+static void test_light(void **state) {
+    const double origin[3] = {300.0, -200.0, 100.0};
+    shape s = {0};
+    shape_add_ellipsoid(&s, 3, (const double[3]){2, 3, 4}, origin, false);
+    shape_add_sphere(&s, 2, 1.0, 300.5, -200, 100);
+    float *const offsets = test_alloc(3 * s.vertices, sizeof *offsets);
+    float *const normals = test_alloc(3 * s.vertices, sizeof *normals);
+    uint32_t *const corners = test_alloc(3 * s.triangles, sizeof *corners);
+    for (size_t k = 0; k < 3 * s.vertices; ++k) {
+        offsets[k] = (float)(s.xyz[k] - origin[k % 3]);
+        normals[k] = s.normals[k];
+    }
+    memcpy(corners, s.corners, 3 * s.triangles * sizeof *corners);
+    ovoid_mesh *full = shape_mesh(*state, &s), *light = NULL;
+    test_check(*state, ov_mesh_adopt_light(*state, offsets, origin, normals, s.vertices, corners,
+                                           s.triangles, &light));
+    assert_int_equal(light->components, 2);
+    assert_memory_equal(light->component_of, full->component_of,
+                        s.vertices * sizeof *light->component_of);
+    for (size_t c = 0; c < 2; ++c) {
+        const ovoid_component *const got = &light->component[c], *const wanted =
+                                                                     &full->component[c];
+        assert_true(got->outer == wanted->outer);
+        expect_near(got->area, wanted->area, 1e-6 * wanted->area, "area");
+        expect_near(got->volume, wanted->volume, 1e-6 * wanted->area, "volume");
+    }
+    const ov_content got = ov_mesh_smooth(light, false), wanted = ov_mesh_smooth(full, false);
+    expect_near(got.area, wanted.area, 1e-6 * wanted.area, "smooth area");
+    expect_near(got.volume, wanted.volume, 1e-6 * wanted.area, "smooth volume");
+    for (size_t v = 0; v < s.vertices; ++v) {
+        double at[3];
+        ov_mesh_at(light, v, at);
+        for (size_t k = 0; k < 3; ++k)
+            expect_near(at[k], s.xyz[3 * v + k], 3e-7, "a vertex");
+    }
+    ovoid_mesh_destroy(&full);
+    ovoid_mesh_destroy(&light);
+    shape_destroy(&s);
+}
+
 /* A ball with a cavity, a torus beside it, and a vertex that nobody uses. */
 static void test_components(void **state) {
     shape s = {0};
@@ -275,6 +330,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_tetrahedron), cmocka_unit_test(test_one_triangle),
         cmocka_unit_test(test_defects),     cmocka_unit_test(test_components),
+        cmocka_unit_test(test_many_edges),  cmocka_unit_test(test_light),
         cmocka_unit_test(test_orders),      cmocka_unit_test(test_flat_surface_stays_flat),
         cmocka_unit_test(test_needles),     cmocka_unit_test(test_refusals),
     };

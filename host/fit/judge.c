@@ -14,14 +14,33 @@
 
 static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
 
-/* *mesh is NULL where there is no surface. */
-static ovoid_status mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
-                                const ovoid_mesh_options *meshing, ovoid_mesh **mesh) {
-    const ovoid_status status = ov_march(context, bodies, count, meshing, piece_limit, mesh);
+/* The light mesh of some bodies, its area and its volume; the normals have done their part then.
+ * *mesh is NULL where there is no surface. */
+static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
+                                ovoid_mesh **mesh, ov_content *content) {
+    const ovoid_status status = ov_march_light(judge->context, bodies, count, &judge->meshing,
+                                               piece_limit, judge->origin, mesh);
+    if (status == OVOID_OK) {
+        *content = ov_mesh_smooth(*mesh, false);
+        free((*mesh)->normals);
+        (*mesh)->normals = NULL;
+    }
     if (status != OVOID_ERROR_EMPTY)
         return status;
     *mesh = NULL;
     return OVOID_OK;
+}
+
+/* The middle of the atoms' box. */
+static void middle_of(const double *xyzr, size_t atoms, double origin[3]) {
+    for (size_t k = 0; k < 3; ++k) {
+        double low = INFINITY, high = -INFINITY;
+        for (size_t i = 0; i < atoms; ++i) {
+            low = fmin(low, xyzr[4 * i + k]);
+            high = fmax(high, xyzr[4 * i + k]);
+        }
+        origin[k] = atoms > 0 ? 0.5 * low + 0.5 * high : 0.0;
+    }
 }
 
 static bool has_outer(const ovoid_mesh *mesh) {
@@ -40,13 +59,11 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     ovoid_mesh_options_init(&made.meshing);
     made.meshing.isovalue = isovalue;
     made.meshing.spacing = spacing;
+    middle_of(xyzr, atoms, made.origin);
     for (size_t i = 0; i < atoms; ++i)
         ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
-    ovoid_status status = mesh_bodies(context, bodies, atoms, &made.meshing, &made.mesh);
+    const ovoid_status status = mesh_bodies(&made, bodies, atoms, &made.mesh, &made.content);
     free(bodies);
-    if (status == OVOID_OK && made.mesh) {
-        made.content = ov_mesh_smooth(made.mesh, false);
-    }
     if (status == OVOID_OK)
         *judge = made;
     else
@@ -60,7 +77,7 @@ void ov_judge_destroy(ov_judge *judge) {
 }
 
 static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
-                               ovoid_mesh **mesh) {
+                               ovoid_mesh **mesh, ov_content *content) {
     ov_body *const bodies = ov_alloc(judge->context, count, sizeof *bodies, "ellipsoids");
     if (!bodies)
         return OVOID_ERROR_MEMORY;
@@ -69,7 +86,7 @@ static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size
         ov_ellipsoid_of_quadric(&quadrics[i], &ellipsoid);
         ov_body_of_ellipsoid(&ellipsoid, &bodies[i]);
     }
-    const ovoid_status status = mesh_bodies(judge->context, bodies, count, &judge->meshing, mesh);
+    const ovoid_status status = mesh_bodies(judge, bodies, count, mesh, content);
     free(bodies);
     return status;
 }
@@ -84,12 +101,16 @@ static int by_distance(const void *a, const void *b) {
     return 0;
 }
 
+/* Counts them alone where spots is NULL. */
 static void add_spots(const ovoid_mesh *mesh, const float *distance, double least, ov_spot *spots,
                       size_t *count) {
     for (size_t v = 0; v < mesh->vertices; ++v)
         if (distance[v] >= least && ov_mesh_is_outer(mesh, v)) {
-            memcpy(spots[*count].at, mesh->xyz + 3 * v, sizeof spots->at);
-            spots[(*count)++].distance = distance[v];
+            if (spots) {
+                ov_mesh_at(mesh, v, spots[*count].at);
+                spots[*count].distance = distance[v];
+            }
+            ++*count;
         }
 }
 
@@ -111,28 +132,6 @@ static void thin_spots(ov_spot *spots, size_t *count, double apart, size_t most)
     *count = kept;
 }
 
-/* distance[v] of each vertex of `from` to the surface `to`. */
-static ovoid_status distances_of_vertices(ov_judge *judge, const ovoid_mesh *from,
-                                          const ovoid_mesh *to, float *distance) {
-    ovoid_status status = OVOID_OK;
-    ovoid_context *const context = judge->context;
-    const double *const origin = judge->mesh->xyz;
-    ov_facets vertices = {0}, triangles = {0};
-    float *const squared = ov_alloc(context, from->vertices, sizeof *squared, "distances");
-    if (!squared)
-        return OVOID_ERROR_MEMORY;
-    OV_TRY(ov_facets_create(context, from, false, OV_FACETS_VERTICES, origin, &vertices));
-    OV_TRY(ov_facets_create(context, to, false, OV_FACETS_TRIANGLES, origin, &triangles));
-    OV_TRY(ov_facets_distances(context, &triangles, vertices.xyz, vertices.points, squared));
-    for (size_t k = 0; k < vertices.points; ++k)
-        distance[vertices.vertex[k]] = sqrtf(squared[k]);
-cleanup:
-    ov_facets_destroy(&vertices);
-    ov_facets_destroy(&triangles);
-    free(squared);
-    return status;
-}
-
 static void judge_distances(const ovoid_mesh *mesh, const float *distance,
                             ov_judgement *judgement) {
     for (size_t v = 0; v < mesh->vertices; ++v) {
@@ -143,13 +142,12 @@ static void judge_distances(const ovoid_mesh *mesh, const float *distance,
 }
 
 /* Fills in the judgement of a mesh of the model, and the distances of both meshes' vertices. */
-static ovoid_status judge_mesh(ov_judge *judge, const ovoid_mesh *mesh, float *from_original,
-                               float *from_model, ov_judgement *judgement) {
+static ovoid_status judge_mesh(ov_judge *judge, const ovoid_mesh *mesh, ov_content content,
+                               float *from_original, float *from_model, ov_judgement *judgement) {
     ovoid_status status = OVOID_OK;
-    const ov_content content = ov_mesh_smooth(mesh, false);
     ov_judgement made = {.valid = true};
-    OV_TRY(distances_of_vertices(judge, judge->mesh, mesh, from_original));
-    OV_TRY(distances_of_vertices(judge, mesh, judge->mesh, from_model));
+    OV_TRY(ov_vertex_distances(judge->context, judge->mesh, mesh, judge->origin, from_original));
+    OV_TRY(ov_vertex_distances(judge->context, mesh, judge->mesh, judge->origin, from_model));
     judge_distances(judge->mesh, from_original, &made);
     judge_distances(mesh, from_model, &made);
     made.area_error = fabs(content.area - judge->content.area) / judge->content.area;
@@ -169,19 +167,26 @@ ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t 
     ovoid_mesh *mesh = NULL;
     float *from_original = NULL, *from_model = NULL;
     ov_spot *found = NULL;
-    size_t found_count = 0;
+    size_t found_count = 0, room = 0;
+    ov_content content;
     *judgement = (ov_judgement){.hausdorff = INFINITY, .deviation = INFINITY, .score = INFINITY};
-    OV_TRY(mesh_model(judge, quadrics, count, &mesh));
+    OV_TRY(mesh_model(judge, quadrics, count, &mesh, &content));
     if (has_outer(mesh) && has_outer(judge->mesh)) {
-        const size_t vertices = judge->mesh->vertices;
-        from_original = ov_alloc(context, vertices, sizeof *from_original, "distances");
+        from_original =
+            ov_alloc(context, judge->mesh->vertices, sizeof *from_original, "distances");
         from_model = ov_alloc(context, mesh->vertices, sizeof *from_model, "distances");
-        found = ov_alloc(context, vertices + mesh->vertices, sizeof *found, "spots");
-        if (!from_original || !from_model || !found) {
+        if (!from_original || !from_model) {
             status = OVOID_ERROR_MEMORY;
             goto cleanup;
         }
-        OV_TRY(judge_mesh(judge, mesh, from_original, from_model, judgement));
+        OV_TRY(judge_mesh(judge, mesh, content, from_original, from_model, judgement));
+        add_spots(judge->mesh, from_original, least, NULL, &room);
+        add_spots(mesh, from_model, least, NULL, &room);
+        found = ov_alloc(context, room, sizeof *found, "spots");
+        if (!found) {
+            status = OVOID_ERROR_MEMORY;
+            goto cleanup;
+        }
         add_spots(judge->mesh, from_original, least, found, &found_count);
         add_spots(mesh, from_model, least, found, &found_count);
         thin_spots(found, &found_count, apart, most);
@@ -212,12 +217,13 @@ ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t 
 ovoid_status ov_judge_volume(ov_judge *judge, const ov_quadric *quadrics, size_t count,
                              double *ratio) {
     ovoid_mesh *mesh = NULL;
+    ov_content content;
     *ratio = 1.0;
     if (!judge->mesh)
         return OVOID_OK;
-    const ovoid_status status = mesh_model(judge, quadrics, count, &mesh);
+    const ovoid_status status = mesh_model(judge, quadrics, count, &mesh, &content);
     if (mesh)
-        *ratio = ov_mesh_smooth(mesh, false).volume / judge->content.volume;
+        *ratio = content.volume / judge->content.volume;
     ovoid_mesh_destroy(&mesh);
     return status;
 }

@@ -7,10 +7,12 @@
 #include "field/ellipsoid.h"
 #include "surface/mesh.h"
 
-/* The original's surface, meshed once. mesh is NULL where the field never reaches the isovalue. */
+/* The original's surface, meshed once: a light mesh without normals. mesh is NULL where the field
+ * never reaches the isovalue. */
 typedef struct ov_judge {
     ovoid_context *context;
     ovoid_mesh_options meshing;
+    double origin[3]; /* of the meshes' offsets, angstrom */
     ovoid_mesh *mesh;
     ov_content content;
     double root_2d; /* sqrt(2 decay), angstrom^-1 */

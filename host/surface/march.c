@@ -26,6 +26,7 @@ typedef struct piece_faces {
 typedef struct marcher {
     const ov_body *bodies;
     const ovoid_mesh_options *options;
+    const double *origin; /* of the offsets of a light mesh, else NULL */
     ov_pieces pieces;
     piece_faces *faces; /* of each piece; empty where not needed, or no longer */
     size_t faces_end;   /* those from here on are gone */
@@ -58,10 +59,11 @@ typedef struct marcher {
     size_t boxes_capacity, refined_capacity;
     float largest; /* value met while there was no vertex */
 
-    double *xyz; /* the mesh so far */
+    double *xyz;    /* the mesh so far, */
+    float *offsets; /* with these in place of xyz if it is light */
     float *normals;
     uint32_t *triangle;
-    size_t xyz_capacity, normals_capacity, triangle_capacity;
+    size_t xyz_capacity, offsets_capacity, normals_capacity, triangle_capacity;
     size_t vertices, triangles;
     size_t new_vertices, new_triangles; /* of the piece */
 } marcher;
@@ -430,15 +432,33 @@ cleanup:
     return status;
 }
 
+static ovoid_status grow_vertices(ovoid_context *context, marcher *m, size_t total) {
+    ovoid_status status = OVOID_OK;
+    if (m->origin)
+        OV_TRY(ov_grow(context, &m->offsets, &m->offsets_capacity, 3 * total, sizeof *m->offsets,
+                       "vertices"));
+    else
+        OV_TRY(ov_grow(context, &m->xyz, &m->xyz_capacity, 3 * total, sizeof *m->xyz, "vertices"));
+    OV_TRY(ov_grow(context, &m->normals, &m->normals_capacity, 3 * total, sizeof *m->normals,
+                   "normals"));
+cleanup:
+    return status;
+}
+
+static void put_coordinate(marcher *m, size_t at, double value) {
+    if (m->origin)
+        m->offsets[at] = (float)(value - m->origin[at % 3]);
+    else
+        m->xyz[at] = value;
+}
+
 /* Appends the piece's vertices to the mesh. */
 static ovoid_status take_vertices(ovoid_context *context, marcher *m, size_t packs) {
     ovoid_status status = OVOID_OK;
     const size_t values = packs * OV_PACK, total = m->vertices + m->new_vertices;
     OV_TRY(ov_grow(context, &m->refined, &m->refined_capacity, 4 * values, sizeof *m->refined,
                    "vertices"));
-    OV_TRY(ov_grow(context, &m->xyz, &m->xyz_capacity, 3 * total, sizeof *m->xyz, "vertices"));
-    OV_TRY(ov_grow(context, &m->normals, &m->normals_capacity, 3 * total, sizeof *m->normals,
-                   "normals"));
+    OV_TRY(grow_vertices(context, m, total));
     float *const t = m->refined, *const normal = t + values;
     OV_TRY(ov_buffer_read(context, &m->t, 0, t, values * sizeof *t));
     OV_TRY(ov_buffer_read(context, &m->normal, 0, normal, 3 * values * sizeof *normal));
@@ -451,7 +471,7 @@ static ovoid_status take_vertices(ovoid_context *context, marcher *m, size_t pac
             const int64_t index =
                 m->pieces.origin[axis] + (int64_t)(m->at[axis] * m->pieces.size[axis] + at[axis]);
             const double within = axis == along ? (double)t[k] : 0.0;
-            m->xyz[to + axis] = ((double)index + within) * m->pieces.spacing;
+            put_coordinate(m, to + axis, ((double)index + within) * m->pieces.spacing);
             m->normals[to + axis] = n[axis * OV_PACK];
         }
     }
@@ -550,13 +570,18 @@ static bool vanishes(const float normal[3]) {
     return normal[0] == 0.0f && normal[1] == 0.0f && normal[2] == 0.0f;
 }
 
+static double coordinate(const marcher *m, size_t vertex, size_t axis) {
+    return m->origin ? (double)m->offsets[3 * vertex + axis] : m->xyz[3 * vertex + axis];
+}
+
 /* Twice a triangle's area times its normal. */
 static void triangle_normal(const marcher *m, const uint32_t corner[3], double normal[3]) {
-    const double *const a = m->xyz + 3 * (size_t)corner[0],
-                        *const b = m->xyz + 3 * (size_t)corner[1],
-                        *const c = m->xyz + 3 * (size_t)corner[2];
-    const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]},
-                 v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    double u[3], v[3];
+    for (size_t k = 0; k < 3; ++k) {
+        const double from = coordinate(m, corner[0], k);
+        u[k] = coordinate(m, corner[1], k) - from;
+        v[k] = coordinate(m, corner[2], k) - from;
+    }
     for (int k = 0; k < 3; ++k)
         normal[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
 }
@@ -595,25 +620,30 @@ static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
 
 /* ---- all of it ---------------------------------------------------------------------------- */
 
-static void destroy_marcher(marcher *m) {
+/* Frees all but the mesh. */
+static void release_work(marcher *m) {
     ov_buffer *const buffers[] = {&m->value,  &m->sign,    &m->crossing,  &m->triangle_count,
                                   &m->cases,  &m->list,    &m->edge,      &m->t,
                                   &m->normal, &m->corners, &m->face_list, &m->ghost_list,
                                   &m->place,  &m->values,  &m->crossings};
     ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
                                   &m->fill_vertices, &m->fill_triangles, &m->refine};
-    void *const memory[] = {m->quadrics,       m->host_crossing, m->host_count, m->ghost_value,
-                            m->ghost_crossing, m->active,        m->edges,      m->boxes,
-                            m->refined,        m->xyz,           m->normals,    m->triangle};
+    void *const memory[] = {m->quadrics,    m->host_crossing,  m->host_count,
+                            m->ghost_value, m->ghost_crossing, m->active,
+                            m->edges,       m->boxes,          m->refined};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
         ov_kernel_destroy(kernels[k]);
     for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
         free(memory[k]);
+    m->quadrics = NULL;
+    m->host_crossing = m->host_count = m->ghost_crossing = m->active = m->edges = NULL;
+    m->ghost_value = m->boxes = m->refined = NULL;
     for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
         drop_faces(&m->faces[k]);
     free(m->faces);
+    m->faces = NULL;
     ov_brick_grid_destroy(&m->grid);
     ov_pieces_destroy(&m->pieces);
     ov_points_destroy(&m->points);
@@ -622,11 +652,47 @@ static void destroy_marcher(marcher *m) {
     ov_operations_destroy(&m->operations);
 }
 
-ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
-                      const ovoid_mesh_options *options, const uint64_t limit[3],
-                      ovoid_mesh **mesh) {
+static void destroy_marcher(marcher *m) {
+    release_work(m);
+    free(m->xyz);
+    free(m->offsets);
+    free(m->normals);
+    free(m->triangle);
+}
+
+/* Gives back what growing has taken too much. */
+static void shrink(void *array_pointer, size_t bytes) {
+    void *array, *less;
+    memcpy(&array, array_pointer, sizeof array);
+    less = array && bytes > 0 ? realloc(array, bytes) : NULL;
+    if (less)
+        memcpy(array_pointer, &less, sizeof less);
+}
+
+/* Hands the arrays over. */
+static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh) {
+    shrink(&m->xyz, 3 * m->vertices * sizeof *m->xyz);
+    shrink(&m->offsets, 3 * m->vertices * sizeof *m->offsets);
+    shrink(&m->normals, 3 * m->vertices * sizeof *m->normals);
+    shrink(&m->triangle, 3 * m->triangles * sizeof *m->triangle);
+    const ovoid_status status =
+        m->origin ? ov_mesh_adopt_light(context, m->offsets, m->origin, m->normals, m->vertices,
+                                        m->triangle, m->triangles, mesh)
+                  : ov_mesh_adopt(context, m->xyz, m->normals, m->vertices, m->triangle,
+                                  m->triangles, mesh);
+    m->xyz = NULL;
+    m->offsets = m->normals = NULL;
+    m->triangle = NULL;
+    if (status == OVOID_OK)
+        (*mesh)->along_curve = true;
+    return status;
+}
+
+static ovoid_status march(ovoid_context *context, const ov_body *bodies, size_t count,
+                          const ovoid_mesh_options *options, const uint64_t limit[3],
+                          const double *origin, ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
-    marcher m = {.bodies = bodies, .options = options};
+    marcher m = {.bodies = bodies, .options = options, .origin = origin};
     OV_TRY(ov_pieces_create(context, bodies, count, options->isovalue,
                             OV_MARCH_CUTOFF * options->isovalue, options->spacing, limit,
                             &m.pieces));
@@ -634,14 +700,21 @@ ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t coun
         OV_TRY(set_up(context, &m));
     OV_TRY(march_pieces(context, &m));
     OV_TRY(mend_normals(context, &m));
-    double *const xyz = m.xyz;
-    float *const normals = m.normals;
-    uint32_t *const triangle = m.triangle;
-    m.xyz = NULL;
-    m.normals = NULL;
-    m.triangle = NULL;
-    OV_TRY(ov_mesh_adopt(context, xyz, normals, m.vertices, triangle, m.triangles, mesh));
+    release_work(&m); /* what is left is the mesh */
+    OV_TRY(adopt(context, &m, mesh));
 cleanup:
     destroy_marcher(&m);
     return status;
+}
+
+ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
+                      const ovoid_mesh_options *options, const uint64_t limit[3],
+                      ovoid_mesh **mesh) {
+    return march(context, bodies, count, options, limit, NULL, mesh);
+}
+
+ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, const uint64_t limit[3],
+                            const double origin[3], ovoid_mesh **mesh) {
+    return march(context, bodies, count, options, limit, origin, mesh);
 }

@@ -22,4 +22,9 @@ ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t coun
                       const ovoid_mesh_options *options, const uint64_t limit[3],
                       ovoid_mesh **mesh);
 
+/* As ov_march(), a light mesh (see mesh.h) about this origin. */
+ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, const uint64_t limit[3],
+                            const double origin[3], ovoid_mesh **mesh);
+
 #endif

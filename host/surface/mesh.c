@@ -21,6 +21,13 @@ static void cross(const double *a, const double *b, double *result) {
     result[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+static void corners_at(const ovoid_mesh *mesh, size_t triangle, double *a, double *b, double *c) {
+    const uint32_t *const corner = mesh->corners + 3 * triangle;
+    ov_mesh_at(mesh, corner[0], a);
+    ov_mesh_at(mesh, corner[1], b);
+    ov_mesh_at(mesh, corner[2], c);
+}
+
 /* ---- components --------------------------------------------------------------------------- */
 
 static uint32_t find_root(uint32_t *parent, uint32_t vertex) {
@@ -107,67 +114,111 @@ static size_t count_edges(half_edge *edges, size_t count, bool *closed) {
     return found;
 }
 
+/* Half-edges of so many, or a share of all of them, are sorted at a time. */
+#define EDGES_LEAST ((size_t)1 << 18)
+#define EDGES_SHARE 4
+
+static uint32_t low_end(const uint32_t *corners, size_t k, uint32_t *high) {
+    const uint32_t a = corners[k], b = corners[k % 3 == 2 ? k - 2 : k + 1];
+    *high = a < b ? b : a;
+    return a < b ? a : b;
+}
+
+/* The vertices from `first` on that have no more than `most` half-edges; at least one. */
+static size_t edges_end(const ovoid_mesh *mesh, const uint32_t *count, size_t first, size_t most) {
+    size_t end = first, sum = 0;
+    while (end < mesh->vertices && (end == first || sum + count[end] <= most))
+        sum += count[end++];
+    return end;
+}
+
+/* Files the half-edges under the vertices from first to end, and counts the edges. count: how many
+ * half-edges a vertex has; becomes where they end. */
+static void check_edges_of(ovoid_mesh *mesh, size_t first, size_t end, uint32_t *count,
+                           half_edge *edges) {
+    uint32_t sum = 0;
+    for (size_t v = first; v < end; ++v) {
+        const uint32_t own = count[v];
+        count[v] = sum;
+        sum += own;
+    }
+    for (size_t k = 0; k < 3 * mesh->triangles; ++k) {
+        uint32_t high;
+        const uint32_t low = low_end(mesh->corners, k, &high);
+        if (low >= first && low < end)
+            edges[count[low]++] = (half_edge)high << 1 | (mesh->corners[k] != low);
+    }
+    for (size_t v = first; v < end; ++v) {
+        ovoid_component *const component = &mesh->component[mesh->component_of[v]];
+        const uint32_t from = v > first ? count[v - 1] : 0;
+        component->euler -= (int32_t)count_edges(edges + from, count[v] - from, &component->closed);
+    }
+}
+
 /* Euler characteristics, and whether components are closed and oriented. Half-edges are sorted by
- * counting: linear. */
+ * counting, those of a share of the vertices at a time: linear, and in little memory. */
 static ovoid_status check_edges(ovoid_context *context, ovoid_mesh *mesh) {
     ovoid_status status = OVOID_ERROR_MEMORY;
-    const size_t half_edges = 3 * mesh->triangles;
-    size_t *const start = ov_alloc(context, mesh->vertices + 2, sizeof *start, "edges of a mesh");
-    half_edge *const edges = ov_alloc(context, half_edges, sizeof *edges, "edges of a mesh");
-    if (!start || !edges)
+    const size_t half_edges = 3 * mesh->triangles, share = half_edges / EDGES_SHARE;
+    const size_t most = share > EDGES_LEAST ? share : EDGES_LEAST;
+    size_t room = most;
+    half_edge *edges = NULL;
+    uint32_t *const count = ov_alloc(context, mesh->vertices, sizeof *count, "edges of a mesh");
+    if (!count)
         goto cleanup;
-    for (size_t pass = 0; pass < 2; ++pass) {
-        for (size_t k = 0; k < half_edges; ++k) {
-            const uint32_t a = mesh->corners[k], b = mesh->corners[k % 3 == 2 ? k - 2 : k + 1];
-            const uint32_t low = a < b ? a : b, high = a < b ? b : a;
-            if (pass == 0)
-                ++start[low + 2];
-            else
-                edges[start[low + 1]++] = (half_edge)high << 1 | (a > b);
+    for (size_t k = 0; k < half_edges; ++k) {
+        uint32_t high;
+        const uint32_t own = ++count[low_end(mesh->corners, k, &high)];
+        if (own == 0) {
+            status = ov_fail(context, OVOID_ERROR_LIMIT, "a vertex of a mesh has 2^32 edges");
+            goto cleanup;
         }
-        for (size_t v = 0; pass == 0 && v < mesh->vertices; ++v)
-            start[v + 2] += start[v + 1];
+        room = own > room ? own : room; /* one vertex with more than its share */
     }
+    edges =
+        ov_alloc(context, room < half_edges ? room : half_edges, sizeof *edges, "edges of a mesh");
+    if (!edges)
+        goto cleanup;
     for (size_t c = 0; c < mesh->components; ++c) {
         mesh->component[c].closed = mesh->component[c].triangles > 0;
         mesh->component[c].euler =
             (int32_t)(mesh->component[c].vertices + mesh->component[c].triangles);
     }
-    for (size_t v = 0; v < mesh->vertices; ++v) {
-        ovoid_component *const component = &mesh->component[mesh->component_of[v]];
-        component->euler -=
-            (int32_t)count_edges(edges + start[v], start[v + 1] - start[v], &component->closed);
+    for (size_t first = 0, end; first < mesh->vertices; first = end) {
+        end = edges_end(mesh, count, first, most);
+        check_edges_of(mesh, first, end, count, edges);
     }
     status = OVOID_OK;
 cleanup:
     free(edges);
-    free(start);
+    free(count);
     return status;
 }
 
 /* Flat areas and volumes. Each component has its own origin, one of its vertices, so that little
  * cancels; where it is closed the origin does not matter. */
 static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh) {
-    const double **const origin =
-        ov_alloc(context, mesh->components, sizeof *origin, "components of a mesh");
-    if (!origin)
+    uint32_t *const first =
+        ov_alloc(context, mesh->components, sizeof *first, "components of a mesh");
+    if (!first)
         return OVOID_ERROR_MEMORY;
     for (size_t v = mesh->vertices; v-- > 0;)
-        origin[mesh->component_of[v]] = mesh->xyz + 3 * v;
+        first[mesh->component_of[v]] = (uint32_t)v;
     for (size_t t = 0; t < mesh->triangles; ++t) {
-        const uint32_t *const corner = mesh->corners + 3 * t;
-        const uint32_t c = mesh->component_of[corner[0]];
-        double a[3], u[3], v[3], normal[3];
-        subtract(mesh->xyz + 3 * (size_t)corner[0], origin[c], a);
-        subtract(mesh->xyz + 3 * (size_t)corner[1], mesh->xyz + 3 * (size_t)corner[0], u);
-        subtract(mesh->xyz + 3 * (size_t)corner[2], mesh->xyz + 3 * (size_t)corner[0], v);
+        const uint32_t c = mesh->component_of[mesh->corners[3 * t]];
+        double origin[3], a[3], u[3], v[3], normal[3];
+        ov_mesh_at(mesh, first[c], origin);
+        corners_at(mesh, t, a, u, v);
+        subtract(u, a, u);
+        subtract(v, a, v);
+        subtract(a, origin, a);
         cross(u, v, normal);
         mesh->component[c].area += 0.5 * sqrt(dot(normal, normal));
         mesh->component[c].volume += dot(a, normal) / 6.0;
     }
     for (size_t c = 0; c < mesh->components; ++c)
         mesh->component[c].outer = mesh->component[c].volume > 0.0;
-    free(origin);
+    free(first);
     return OVOID_OK;
 }
 
@@ -179,7 +230,8 @@ static ovoid_status check_arrays(ovoid_context *context, const ovoid_mesh *mesh)
                        "a mesh holds at most 2^32 - 2 vertices and triangles, not %zu and %zu",
                        mesh->vertices, mesh->triangles);
     for (size_t k = 0; k < 3 * mesh->vertices; ++k)
-        if (!isfinite(mesh->xyz[k]) || (mesh->normals && !isfinite(mesh->normals[k])))
+        if (!isfinite(mesh->xyz ? mesh->xyz[k] : mesh->offsets[k]) ||
+            (mesh->normals && !isfinite(mesh->normals[k])))
             return ov_fail(context, OVOID_ERROR_ARGUMENT,
                            "vertex %zu of a mesh has a coordinate or normal that is not finite",
                            k / 3);
@@ -201,13 +253,13 @@ static ovoid_status make_normals(ovoid_context *context, ovoid_mesh *mesh) {
         return OVOID_ERROR_MEMORY;
     }
     for (size_t t = 0; t < mesh->triangles; ++t) {
-        const uint32_t *const corner = mesh->corners + 3 * t;
-        double u[3], v[3], normal[3];
-        subtract(mesh->xyz + 3 * (size_t)corner[1], mesh->xyz + 3 * (size_t)corner[0], u);
-        subtract(mesh->xyz + 3 * (size_t)corner[2], mesh->xyz + 3 * (size_t)corner[0], v);
+        double a[3], u[3], v[3], normal[3];
+        corners_at(mesh, t, a, u, v);
+        subtract(u, a, u);
+        subtract(v, a, v);
         cross(u, v, normal);
         for (size_t k = 0; k < 9; ++k)
-            sum[3 * (size_t)corner[k / 3] + k % 3] += normal[k % 3];
+            sum[3 * (size_t)mesh->corners[3 * t + k / 3] + k % 3] += normal[k % 3];
     }
     for (size_t v = 0; v < mesh->vertices; ++v) {
         const double length = sqrt(dot(sum + 3 * v, sum + 3 * v));
@@ -219,38 +271,59 @@ static ovoid_status make_normals(ovoid_context *context, ovoid_mesh *mesh) {
     return OVOID_OK;
 }
 
-ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
-                           uint32_t *corners, size_t triangles, ovoid_mesh **mesh) {
+/* Takes `arrays` over. */
+static ovoid_status finish_mesh(ovoid_context *context, const ovoid_mesh *arrays,
+                                ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     ovoid_mesh *made = ov_alloc(context, 1, sizeof *made, "a mesh");
     if (!made) {
-        free(xyz);
-        free(normals);
-        free(corners);
+        free(arrays->xyz);
+        free(arrays->offsets);
+        free(arrays->normals);
+        free(arrays->corners);
         return OVOID_ERROR_MEMORY;
     }
-    *made = (ovoid_mesh){.vertices = vertices,
-                         .triangles = triangles,
-                         .xyz = xyz,
-                         .normals = normals,
-                         .corners = corners};
+    *made = *arrays;
     OV_TRY(check_arrays(context, made));
-    if (!normals)
+    if (!made->normals)
         OV_TRY(make_normals(context, made));
     made->component_of =
-        ov_alloc(context, vertices, sizeof *made->component_of, "components of a mesh");
+        ov_alloc(context, made->vertices, sizeof *made->component_of, "components of a mesh");
     if (!made->component_of) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
     OV_TRY(find_components(context, made));
-    OV_TRY(check_edges(context, made));
+    if (made->xyz)
+        OV_TRY(check_edges(context, made));
     OV_TRY(measure_components(context, made));
     *mesh = made;
     made = NULL;
 cleanup:
     ovoid_mesh_destroy(&made);
     return status;
+}
+
+ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
+                           uint32_t *corners, size_t triangles, ovoid_mesh **mesh) {
+    const ovoid_mesh arrays = {.vertices = vertices,
+                               .triangles = triangles,
+                               .xyz = xyz,
+                               .normals = normals,
+                               .corners = corners};
+    return finish_mesh(context, &arrays, mesh);
+}
+
+ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const double origin[3],
+                                 float *normals, size_t vertices, uint32_t *corners,
+                                 size_t triangles, ovoid_mesh **mesh) {
+    const ovoid_mesh arrays = {.vertices = vertices,
+                               .triangles = triangles,
+                               .offsets = offsets,
+                               .origin = {origin[0], origin[1], origin[2]},
+                               .normals = normals,
+                               .corners = corners};
+    return finish_mesh(context, &arrays, mesh);
 }
 
 static void *copy_of(ovoid_context *context, const void *data, size_t count, size_t size) {
@@ -285,6 +358,7 @@ void ovoid_mesh_destroy(ovoid_mesh **mesh) {
     if (!mesh || !*mesh)
         return;
     free((*mesh)->xyz);
+    free((*mesh)->offsets);
     free((*mesh)->normals);
     free((*mesh)->corners);
     free((*mesh)->component_of);
@@ -354,10 +428,11 @@ typedef struct bent_triangle {
 } bent_triangle;
 
 static void bend(const ovoid_mesh *mesh, size_t triangle, const double *origin, bent_triangle *t) {
+    corners_at(mesh, triangle, t->p[0], t->p[1], t->p[2]);
     for (size_t i = 0; i < 3; ++i) {
         const size_t v = mesh->corners[3 * triangle + i];
         for (size_t k = 0; k < 3; ++k) {
-            t->p[i][k] = mesh->xyz[3 * v + k] - origin[k];
+            t->p[i][k] -= origin[k];
             t->n[i][k] = mesh->normals[3 * v + k];
         }
     }
@@ -411,11 +486,14 @@ static void integrate_bent(const bent_triangle *t, ov_content *content) {
 
 ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only) {
     ov_content content = {0.0, 0.0};
+    double origin[3] = {0.0, 0.0, 0.0};
+    if (mesh->vertices > 0)
+        ov_mesh_at(mesh, 0, origin);
     for (size_t t = 0; t < mesh->triangles; ++t) {
         if (outer_only && !ov_mesh_component_of_triangle(mesh, t)->outer)
             continue;
         bent_triangle bent;
-        bend(mesh, t, mesh->xyz, &bent);
+        bend(mesh, t, origin, &bent);
         integrate_bent(&bent, &content);
     }
     return content;

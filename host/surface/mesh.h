@@ -7,21 +7,46 @@
 #include "base/base.h"
 #include "ovoid/surface.h"
 
+/* A light mesh, which the library keeps for itself, has offsets instead of xyz, knows nothing of
+ * its edges (its components' closed and euler are 0), and may have given up its normals. */
 struct ovoid_mesh {
     size_t vertices, triangles;
-    double *xyz;            /* 3 * vertices, angstrom */
-    float *normals;         /* 3 * vertices, outward unit vectors */
+    double *xyz;            /* 3 * vertices, angstrom; NULL if light */
+    float *offsets;         /* 3 * vertices, angstrom from the origin; NULL unless light */
+    double origin[3];       /* of the offsets */
+    float *normals;         /* 3 * vertices, outward unit vectors; NULL if given up */
     uint32_t *corners;      /* 3 * triangles */
     uint32_t *component_of; /* vertices */
     ovoid_component *component;
     size_t components;
+    bool along_curve; /* vertices and triangles follow a space-filling curve, none is without the
+                         other */
 };
+
+static inline void ov_mesh_at(const ovoid_mesh *mesh, size_t vertex, double at[3]) {
+    for (size_t k = 0; k < 3; ++k)
+        at[k] = mesh->xyz ? mesh->xyz[3 * vertex + k]
+                          : mesh->origin[k] + (double)mesh->offsets[3 * vertex + k];
+}
+
+static inline void ov_mesh_centre(const ovoid_mesh *mesh, size_t triangle, double centre[3]) {
+    double at[3][3];
+    for (size_t i = 0; i < 3; ++i)
+        ov_mesh_at(mesh, mesh->corners[3 * triangle + i], at[i]);
+    for (size_t k = 0; k < 3; ++k)
+        centre[k] = (at[0][k] + at[1][k] + at[2][k]) / 3.0;
+}
 
 /* Makes a mesh that takes the arrays over (they are freed on failure too): normals may be NULL.
  * Finds the components, numbered by their first vertex. OVOID_ERROR_ARGUMENT when a corner names no
  * vertex or a coordinate is not finite, OVOID_ERROR_LIMIT beyond 2^32 - 1 vertices or triangles. */
 ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
                            uint32_t *corners, size_t triangles, ovoid_mesh **mesh);
+
+/* A light mesh: offsets from origin, and normals. */
+ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const double origin[3],
+                                 float *normals, size_t vertices, uint32_t *corners,
+                                 size_t triangles, ovoid_mesh **mesh);
 
 /* Component of a triangle. */
 static inline const ovoid_component *ov_mesh_component_of_triangle(const ovoid_mesh *mesh,

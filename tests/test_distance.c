@@ -256,7 +256,7 @@ static void test_vertices(void **state) {
         float *const got = test_alloc(from->vertices, sizeof *got);
         bool *const used = test_alloc(from->vertices, sizeof *used);
         got[0] = NAN;
-        test_check(context, ov_vertex_distances(context, from, to, middle, got));
+        test_check(context, ov_vertex_distances(context, from, to, middle, NULL, got));
         for (size_t k = 0; k < 3 * from->triangles; ++k)
             used[from->corners[k]] = true;
         for (size_t v = 0; v < from->vertices; ++v)
@@ -272,6 +272,39 @@ static void test_vertices(void **state) {
         ovoid_mesh_destroy(&light[n]);
         shape_destroy(&s[n]);
     }
+}
+
+/* Chunks that are far away are not looked at: balls in a row, in chunks of their own. */
+static void test_far_chunks(void **state) {
+    enum { BALLS = 8 };
+    ovoid_context *const context = *state;
+    const int level = test_small() ? 2 : 3; /* 20 or 80 leaves each */
+    shape s = {0};
+    for (int n = 0; n < BALLS; ++n)
+        shape_add_sphere(&s, level, 2.0, 10.0 * n, 0, 0);
+    ovoid_mesh *mesh = shape_mesh(context, &s);
+    mesh->along_curve = true;
+    const double origin[3] = {40, 0, 0};
+    ov_trail trail = {0};
+    ov_facets facets = {0};
+    ov_device *device;
+    float *const squared = test_alloc(mesh->vertices, sizeof *squared);
+    test_check(context, ov_device_get(context, &device));
+    test_check(context, ov_trail_create(context, mesh, false, &trail));
+    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    facets.chunk = mesh->triangles / OV_LEAF / BALLS;
+    facets.batch = mesh->vertices / BALLS;
+    const ov_sites sites = {.count = mesh->vertices, .trail = &trail};
+    const uint64_t before = device->launches;
+    test_check(context, ov_facets_distances(context, &facets, &sites, squared));
+    assert_int_equal(device->launches - before, 2 * BALLS); /* the coarse ones, and one each */
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        expect_near(squared[v], 0.0, 1e-9, "distance of a vertex from itself");
+    free(squared);
+    ov_facets_destroy(&facets);
+    ov_trail_destroy(&trail);
+    ovoid_mesh_destroy(&mesh);
+    shape_destroy(&s);
 }
 
 static void test_repeats(void **state) {
@@ -329,6 +362,7 @@ int main(void) {
         cmocka_unit_test(test_spheres),      cmocka_unit_test(test_ways),
         cmocka_unit_test(test_twin),         cmocka_unit_test(test_repeats),
         cmocka_unit_test(test_vertices),     cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_far_chunks),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

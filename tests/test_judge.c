@@ -23,7 +23,8 @@ static double spacing(void) {
 static void judge_atoms(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
                         double isovalue, ov_judge *judge) {
     memset(judge, 0, sizeof *judge);
-    test_check(context, ov_judge_create(context, xyzr, atoms, decay, isovalue, spacing(), judge));
+    test_check(context, ov_judge_create(context, xyzr, atoms, decay, isovalue, spacing(),
+                                        (ov_watch){0}, judge));
 }
 
 static ov_judgement judgement_of(ovoid_context *context, ov_judge *judge,
@@ -221,6 +222,52 @@ static void no_surface_of_the_model(void **state) {
     ov_judge_destroy(&judge);
 }
 
+/* ---- stopping ----------------------------------------------------------------------------- */
+
+typedef struct countdown {
+    unsigned asked, most;
+} countdown;
+
+static bool count_down(void *user) {
+    countdown *const c = user;
+    return ++c->asked <= c->most;
+}
+
+/* Stopped at each of the questions in turn, and never where there are as many as that. */
+static void stopping(void **state) {
+    countdown all = {.most = 1000000};
+    ov_judge judge = {0};
+    ov_judgement got;
+    ov_spot *spots = NULL;
+    size_t count = 0;
+    const ov_watch patient = {.go_on = count_down, .user = &all};
+    test_check(*state, ov_judge_create(*state, two, 2, 0.5, 1.0, spacing(), patient, &judge));
+    assert_true(all.asked >= 1);
+    countdown none = {0};
+    ov_judge other = {0};
+    test_refused(*state,
+                 ov_judge_create(*state, two, 2, 0.5, 1.0, spacing(),
+                                 (ov_watch){.go_on = count_down, .user = &none}, &other),
+                 OVOID_ERROR_CANCELLED, "meshing");
+    ov_quadric *const quadrics = quadrics_of(two, 2, 0.5);
+    all.asked = 0;
+    test_check(*state, ov_judge_model(&judge, quadrics, 2, &got));
+    const unsigned questions = all.asked;
+    print_message("%u questions\n", questions);
+    assert_true(questions >= 3); /* a mesh and two ways */
+    for (all.most = 0; all.most < questions; ++all.most) {
+        all.asked = 0;
+        test_refused(*state, ov_judge_spots(&judge, quadrics, 2, 0.0, 1.0, 9, &got, &spots, &count),
+                     OVOID_ERROR_CANCELLED, all.most + 2 < questions ? "meshing" : "distances");
+        assert_int_equal(all.asked, all.most + 1);
+        assert_null(spots);
+    }
+    all.asked = 0;
+    test_check(*state, ov_judge_model(&judge, quadrics, 2, &got));
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
 /* ---- volumes ------------------------------------------------------------------------------ */
 
 /* Spheres too small or too large by 5 % in volume become equal in three steps, and no factor is
@@ -263,6 +310,7 @@ int main(void) {
         cmocka_unit_test(a_filled_cavity),
         cmocka_unit_test(no_surface_of_the_original),
         cmocka_unit_test(no_surface_of_the_model),
+        cmocka_unit_test(stopping),
         cmocka_unit_test(factors_make_volumes_equal),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);

@@ -753,7 +753,7 @@ static void light_meshes_are_the_same(void **state) {
         ov_body_of_atom(xyzr + 4 * i, 0.5, &bodies[i]);
     const ovoid_mesh_options options = options_of(c, coarse(0.5), OVOID_VERTEX_EXACT);
     test_check(*state, ov_march(*state, bodies, 2, &options, limit, &full));
-    test_check(*state, ov_march_light(*state, bodies, 2, &options, limit, origin, &light));
+    test_check(*state, ov_march_light(*state, bodies, 2, &options, limit, origin, NULL, &light));
     const size_t vertices = full->vertices, triangles = full->triangles;
     assert_true(full->along_curve && light->along_curve);
     assert_null(light->xyz);

@@ -64,7 +64,7 @@ static ovoid_status prepare(ov_adaptive *f) {
     ov_buffer_destroy(&f->samples.value); /* the target has taken over what it needs */
     ov_buffer_destroy(&f->samples.gradient);
     OV_TRY(ov_judge_create(f->context, f->xyzr, f->atoms, options->decay, options->isovalue,
-                           options->adaptive.mesh_spacing, &f->judge));
+                           options->adaptive.mesh_spacing, (ov_watch){0}, &f->judge));
 cleanup:
     return status;
 }

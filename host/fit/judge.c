@@ -19,7 +19,7 @@ static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
 static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
                                 ovoid_mesh **mesh, ov_content *content) {
     const ovoid_status status = ov_march_light(judge->context, bodies, count, &judge->meshing,
-                                               piece_limit, judge->origin, mesh);
+                                               piece_limit, judge->origin, &judge->watch, mesh);
     if (status == OVOID_OK) {
         *content = ov_mesh_smooth(*mesh, false);
         free((*mesh)->normals);
@@ -51,8 +51,8 @@ static bool has_outer(const ovoid_mesh *mesh) {
 }
 
 ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
-                             double isovalue, double spacing, ov_judge *judge) {
-    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay)};
+                             double isovalue, double spacing, ov_watch watch, ov_judge *judge) {
+    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay), .watch = watch};
     ov_body *const bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
     if (!bodies)
         return OVOID_ERROR_MEMORY;
@@ -146,8 +146,10 @@ static ovoid_status judge_mesh(ov_judge *judge, const ovoid_mesh *mesh, ov_conte
                                float *from_original, float *from_model, ov_judgement *judgement) {
     ovoid_status status = OVOID_OK;
     ov_judgement made = {.valid = true};
-    OV_TRY(ov_vertex_distances(judge->context, judge->mesh, mesh, judge->origin, from_original));
-    OV_TRY(ov_vertex_distances(judge->context, mesh, judge->mesh, judge->origin, from_model));
+    OV_TRY(ov_vertex_distances(judge->context, judge->mesh, mesh, judge->origin, &judge->watch,
+                               from_original));
+    OV_TRY(ov_vertex_distances(judge->context, mesh, judge->mesh, judge->origin, &judge->watch,
+                               from_model));
     judge_distances(judge->mesh, from_original, &made);
     judge_distances(mesh, from_model, &made);
     made.area_error = fabs(content.area - judge->content.area) / judge->content.area;

@@ -16,6 +16,7 @@ typedef struct ov_judge {
     ovoid_mesh *mesh;
     ov_content content;
     double root_2d; /* sqrt(2 decay), angstrom^-1 */
+    ov_watch watch; /* asked during whatever takes long */
 } ov_judge;
 
 typedef struct ov_judgement {
@@ -34,7 +35,7 @@ typedef struct ov_spot {
 } ov_spot;
 
 ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
-                             double isovalue, double spacing, ov_judge *judge);
+                             double isovalue, double spacing, ov_watch watch, ov_judge *judge);
 void ov_judge_destroy(ov_judge *judge);
 
 /* Distances are those of the meshes' vertices, which lie on the surfaces. */

@@ -263,6 +263,7 @@ static ovoid_status measure_leaves(ovoid_context *context, measuring *m, bool co
     OV_TRY(load_leaves(context, m->facets, coarse, m->first, m->end, m->box));
     for (size_t k = 0, size; k < count; k += size) {
         const float *xyz;
+        OV_TRY(ov_watch_ask(context, m->facets->watch, "measuring distances"));
         size = count - k < batch ? count - k : batch;
         find_sites(m, k, size, &xyz);
         if (!m->use_bound || !out_of_reach(m, xyz, size, squared + k))
@@ -351,7 +352,8 @@ static void put_distances(const ov_trail *trail, const float *squared, float *di
 }
 
 ovoid_status ov_vertex_distances(ovoid_context *context, const ovoid_mesh *from,
-                                 const ovoid_mesh *to, const double origin[3], float *distance) {
+                                 const ovoid_mesh *to, const double origin[3],
+                                 const ov_watch *watch, float *distance) {
     ovoid_status status = OVOID_OK;
     ov_trail points = {0}, triangles = {0};
     ov_facets facets = {0};
@@ -360,6 +362,7 @@ ovoid_status ov_vertex_distances(ovoid_context *context, const ovoid_mesh *from,
     OV_TRY(ov_trail_create(context, to, false, &triangles));
     OV_TRY(ov_facets_create(context, &triangles, origin, &facets));
     const ov_sites sites = {.count = points.vertices, .trail = &points};
+    facets.watch = watch;
     if (points.vertex) {
         squared = ov_alloc(context, sites.count, sizeof *squared, "distances");
         if (!squared) {

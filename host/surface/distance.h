@@ -24,6 +24,7 @@ typedef struct ov_facets {
     const ov_trail *trail; /* borrowed */
     double origin[3];      /* angstrom, subtracted before rounding to float */
     size_t chunk, batch;   /* as above, or less in tests */
+    const ov_watch *watch; /* asked before each batch; may be NULL */
     ov_tree tree;
     ov_buffer boxes;  /* device: the tree's boxes */
     ov_buffer leaves; /* device: the current chunk as kernels/distance.cl has it */
@@ -48,9 +49,11 @@ typedef struct ov_sites {
 ovoid_status ov_facets_distances(ovoid_context *context, ov_facets *facets, const ov_sites *sites,
                                  float *squared);
 
-/* distance[v] of each vertex of `from` that is in a triangle to the surface `to`; 0 for others. */
+/* distance[v] of each vertex of `from` that is in a triangle to the surface `to`; 0 for others.
+ * watch may be NULL. */
 ovoid_status ov_vertex_distances(ovoid_context *context, const ovoid_mesh *from,
-                                 const ovoid_mesh *to, const double origin[3], float *distance);
+                                 const ovoid_mesh *to, const double origin[3],
+                                 const ov_watch *watch, float *distance);
 
 /* ovoid_mesh_distances() that tells the distance of each vertex of both meshes, where not NULL;
  * those of vertices that are left out stay as they are. */

@@ -27,6 +27,7 @@ typedef struct marcher {
     const ov_body *bodies;
     const ovoid_mesh_options *options;
     const double *origin; /* of the offsets of a light mesh, else NULL */
+    const ov_watch *watch;
     ov_pieces pieces;
     piece_faces *faces; /* of each piece; empty where not needed, or no longer */
     size_t faces_end;   /* those from here on are gone */
@@ -549,6 +550,7 @@ static ovoid_status fail_empty(ovoid_context *context, const marcher *m) {
 static ovoid_status march_pieces(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     for (size_t piece = m->pieces.pieces; piece-- > 0;) {
+        OV_TRY(ov_watch_ask(context, m->watch, "meshing"));
         drop_old_faces(m, piece);
         OV_TRY(evaluate(context, m, piece));
         OV_TRY(fill_ghosts(context, m));
@@ -690,9 +692,9 @@ static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh)
 
 static ovoid_status march(ovoid_context *context, const ov_body *bodies, size_t count,
                           const ovoid_mesh_options *options, const uint64_t limit[3],
-                          const double *origin, ovoid_mesh **mesh) {
+                          const double *origin, const ov_watch *watch, ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
-    marcher m = {.bodies = bodies, .options = options, .origin = origin};
+    marcher m = {.bodies = bodies, .options = options, .origin = origin, .watch = watch};
     OV_TRY(ov_pieces_create(context, bodies, count, options->isovalue,
                             OV_MARCH_CUTOFF * options->isovalue, options->spacing, limit,
                             &m.pieces));
@@ -710,11 +712,11 @@ cleanup:
 ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
                       const ovoid_mesh_options *options, const uint64_t limit[3],
                       ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, NULL, mesh);
+    return march(context, bodies, count, options, limit, NULL, NULL, mesh);
 }
 
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
-                            const double origin[3], ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, origin, mesh);
+                            const double origin[3], const ov_watch *watch, ovoid_mesh **mesh) {
+    return march(context, bodies, count, options, limit, origin, watch, mesh);
 }

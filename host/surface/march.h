@@ -5,6 +5,7 @@
 #define OV_MARCH_H
 
 #include "ovoid/surface.h"
+#include "surface/mesh.h"
 #include "surface/pieces.h"
 
 /* Lattice points of a piece, per axis, at most: a million, 16 MB on the device. Multiples of the
@@ -22,9 +23,10 @@ ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t coun
                       const ovoid_mesh_options *options, const uint64_t limit[3],
                       ovoid_mesh **mesh);
 
-/* As ov_march(), a light mesh (see mesh.h) about this origin. */
+/* As ov_march(), a light mesh (see mesh.h) about this origin. The watch, which may be NULL, is
+ * asked before each piece. */
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
-                            const double origin[3], ovoid_mesh **mesh);
+                            const double origin[3], const ov_watch *watch, ovoid_mesh **mesh);
 
 #endif

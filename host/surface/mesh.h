@@ -23,6 +23,20 @@ struct ovoid_mesh {
                          other */
 };
 
+/* Asked between the parts of something long; false stops it with OVOID_ERROR_CANCELLED. {0} lets it
+ * go on. */
+typedef struct ov_watch {
+    bool (*go_on)(void *user);
+    void *user;
+} ov_watch;
+
+static inline ovoid_status ov_watch_ask(ovoid_context *context, const ov_watch *watch,
+                                        const char *what) {
+    if (!watch || !watch->go_on || watch->go_on(watch->user))
+        return OVOID_OK;
+    return ov_fail(context, OVOID_ERROR_CANCELLED, "stopped while %s", what);
+}
+
 static inline void ov_mesh_at(const ovoid_mesh *mesh, size_t vertex, double at[3]) {
     for (size_t k = 0; k < 3; ++k)
         at[k] = mesh->xyz ? mesh->xyz[3 * vertex + k]

@@ -450,37 +450,52 @@ static void bend(const ovoid_mesh *mesh, size_t triangle, const double *origin, 
     }
 }
 
-/* X, and its derivatives' cross product, at barycentric coordinates l. */
-static void bent_at(const bent_triangle *t, const double *l, double *x, double *area) {
-    double u[3], v[3];
-    for (size_t k = 0; k < 3; ++k) {
-        const double b0 = t->b[0][k], b1 = t->b[1][k], b2 = t->b[2][k];
-        x[k] = l[0] * t->p[0][k] + l[1] * t->p[1][k] + l[2] * t->p[2][k] + l[0] * l[1] * b0 +
-               l[1] * l[2] * b1 + l[2] * l[0] * b2;
-        u[k] = t->p[1][k] - t->p[0][k] + (l[0] - l[1]) * b0 + l[2] * (b1 - b2);
-        v[k] = t->p[2][k] - t->p[0][k] + (l[0] - l[2]) * b2 + l[1] * (b1 - b0);
-    }
-    cross(u, v, area);
-}
+/* Dunavant's rule of degree 4, which the volume's integrand has: barycentric coordinates and
+ * weights. */
+enum { NODES = 6 };
+#define NEAR 0.445948490915965
+#define FAR 0.091576213509771
+#define NEAR_WEIGHT 0.223381589678011
+#define FAR_WEIGHT 0.109951743655322
+#define NEAR_APEX (1.0 - 2.0 * NEAR)
+#define FAR_APEX (1.0 - 2.0 * FAR)
+static const double node[3][NODES] = {{NEAR_APEX, NEAR, NEAR, FAR_APEX, FAR, FAR},
+                                      {NEAR, NEAR_APEX, NEAR, FAR, FAR_APEX, FAR},
+                                      {NEAR, NEAR, NEAR_APEX, FAR, FAR, FAR_APEX}};
+static const double node_weight[NODES] = {NEAR_WEIGHT, NEAR_WEIGHT, NEAR_WEIGHT,
+                                          FAR_WEIGHT,  FAR_WEIGHT,  FAR_WEIGHT};
 
-/* Dunavant's rule of degree 4, which the volume's integrand has. The area's is the vector area
- * along the interpolated normal: signed, so that what bending folds over in a needle of a triangle
- * counts for nothing. */
+/* The area's integrand is the vector area along the interpolated normal: signed, so that what
+ * bending folds over in a needle of a triangle counts for nothing. All nodes go side by side, which
+ * compilers turn into vectors. */
 static void integrate_bent(const bent_triangle *t, ov_content *content) {
-    static const double near_edge[2] = {0.445948490915965, 0.091576213509771};
-    static const double weight[2] = {0.223381589678011, 0.109951743655322};
-    for (size_t q = 0; q < 6; ++q) {
-        double l[3], x[3], area[3], normal[3];
-        for (size_t i = 0; i < 3; ++i)
-            l[i] = near_edge[q / 3];
-        l[q % 3] = 1.0 - 2.0 * near_edge[q / 3];
-        bent_at(t, l, x, area);
-        for (size_t k = 0; k < 3; ++k)
-            normal[k] = l[0] * t->n[0][k] + l[1] * t->n[1][k] + l[2] * t->n[2][k];
-        const double length = sqrt(dot(normal, normal));
-        if (length > 1e-3)
-            content->area += 0.5 * weight[q / 3] * dot(area, normal) / length;
-        content->volume += weight[q / 3] * dot(x, area) / 6.0;
+    double x[3][NODES], n[3][NODES], u[3][NODES], v[3][NODES];
+    for (size_t k = 0; k < 3; ++k) {
+        const double *const p0 = t->p[0], *const p1 = t->p[1], *const p2 = t->p[2];
+        const double b0 = t->b[0][k], b1 = t->b[1][k], b2 = t->b[2][k];
+        const double u0 = p1[k] - p0[k], v0 = p2[k] - p0[k];
+        for (size_t q = 0; q < NODES; ++q) {
+            const double l0 = node[0][q], l1 = node[1][q], l2 = node[2][q];
+            x[k][q] =
+                l0 * p0[k] + l1 * p1[k] + l2 * p2[k] + l0 * l1 * b0 + l1 * l2 * b1 + l2 * l0 * b2;
+            n[k][q] = l0 * t->n[0][k] + l1 * t->n[1][k] + l2 * t->n[2][k];
+            u[k][q] = u0 + (l0 - l1) * b0 + l2 * (b1 - b2);
+            v[k][q] = v0 + (l0 - l2) * b2 + l1 * (b1 - b0);
+        }
+    }
+    double volume[NODES], along[NODES], square[NODES];
+    for (size_t q = 0; q < NODES; ++q) {
+        const double a0 = u[1][q] * v[2][q] - u[2][q] * v[1][q],
+                     a1 = u[2][q] * v[0][q] - u[0][q] * v[2][q],
+                     a2 = u[0][q] * v[1][q] - u[1][q] * v[0][q];
+        volume[q] = x[0][q] * a0 + x[1][q] * a1 + x[2][q] * a2;
+        along[q] = n[0][q] * a0 + n[1][q] * a1 + n[2][q] * a2;
+        square[q] = n[0][q] * n[0][q] + n[1][q] * n[1][q] + n[2][q] * n[2][q];
+    }
+    for (size_t q = 0; q < NODES; ++q) {
+        if (square[q] > 1e-6)
+            content->area += 0.5 * node_weight[q] * along[q] / sqrt(square[q]);
+        content->volume += node_weight[q] / 6.0 * volume[q];
     }
 }
 

@@ -204,10 +204,10 @@ static void test_twin(void **state) {
     shape_add_torus(&s[1], test_size(16, 6), 5.0, 1.0);
     ovoid_mesh *a = shape_mesh(context, &s[0]), *b = shape_mesh(context, &s[1]);
     float *const from_a = test_alloc(a->vertices, sizeof *from_a);
-    for (int n = 0; n < 4; ++n) {
-        const bool outer = n % 2;
+    float *const again = test_alloc(a->vertices, sizeof *again);
+    for (int outer = 0; outer <= 1; ++outer) {
         ovoid_distances got;
-        a->along_curve = b->along_curve = n / 2; /* taken as they are, which is no worse */
+        a->along_curve = b->along_curve = false;
         for (size_t v = 0; v < a->vertices; ++v)
             from_a[v] = -1.0f;
         test_check(context, ovoid_mesh_distances(context, a, b, outer, &got, from_a));
@@ -218,7 +218,14 @@ static void test_twin(void **state) {
                         left_out ? 0.0 : reference_mesh_distance(a->xyz + 3 * v, b, outer), 3e-6,
                         "distance of a vertex");
         }
+        ovoid_distances same;
+        a->along_curve = b->along_curve = true; /* taken as they are, which is no worse */
+        test_check(context, ovoid_mesh_distances(context, a, b, outer, &same, again));
+        expect_same(same, got);
+        for (size_t v = 0; v < a->vertices; ++v)
+            expect_near(again[v], from_a[v], 1e-6, "distance of a vertex");
     }
+    free(again);
     free(from_a);
     ovoid_mesh_destroy(&a);
     ovoid_mesh_destroy(&b);

@@ -131,33 +131,71 @@ cleanup:
     return status;
 }
 
+static void point_of(const ov_points *points, const float *xyz, size_t k, double at[3]) {
+    const float *const p = xyz + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
+    for (size_t axis = 0; axis < 3; ++axis)
+        at[axis] = points->origin[axis] + (double)p[axis * OV_PACK];
+}
+
+/* The middle of a pack's box; returns the half of its diagonal. */
+static double middle_of(const ov_points *points, const float *xyz, size_t pack, double middle[3]) {
+    double low[3], high[3], square = 0.0;
+    point_of(points, xyz, pack * OV_PACK, low);
+    memcpy(high, low, sizeof high);
+    for (size_t k = 1; k < OV_PACK; ++k) {
+        double at[3];
+        point_of(points, xyz, pack * OV_PACK + k, at);
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = fmin(low[axis], at[axis]);
+            high[axis] = fmax(high[axis], at[axis]);
+        }
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        middle[axis] = 0.5 * (low[axis] + high[axis]);
+        square += (high[axis] - low[axis]) * (high[axis] - low[axis]);
+    }
+    return 0.5 * sqrt(square);
+}
+
+/* Multiplies the emphasis of the points near the places of the grids: of the reach, and of twice
+ * that, which tells most packs that no place is near any of their points. */
+static void emphasise(ov_target *target, const float *xyz, const ov_grid *grid, const ov_grid *wide,
+                      float factor) {
+    const ov_points *const points = target->points;
+    uint32_t near[2 * OV_NEAR_MAX];
+    double at[3];
+    for (size_t pack = 0; pack < points->packs; ++pack) {
+        if (middle_of(points, xyz, pack, at) <= grid->reach &&
+            ov_grid_near(wide, at, UINT32_MAX, near) == 0)
+            continue;
+        for (size_t k = pack * OV_PACK; k < (pack + 1) * OV_PACK; ++k) {
+            point_of(points, xyz, k, at);
+            if (ov_grid_near(grid, at, UINT32_MAX, near) > 0)
+                target->emphasis[k] = fminf(target->emphasis[k] * factor, OV_EMPHASIS_MAX);
+        }
+    }
+}
+
 ovoid_status ov_target_emphasise(ovoid_context *context, ov_target *target, const double *places,
                                  size_t stride, size_t count, double reach, double factor) {
     ovoid_status status = OVOID_OK;
-    const ov_points *const points = target->points;
-    const size_t size = points->packs * OV_PACK;
-    ov_grid grid = {0};
-    uint32_t near[2 * OV_NEAR_MAX];
+    const size_t size = target->points->packs * OV_PACK;
+    ov_grid grid = {0}, wide = {0};
+    if (count == 0)
+        return OVOID_OK;
     float *const xyz = ov_alloc(context, 3 * size, sizeof *xyz, "points");
     if (!xyz)
         return OVOID_ERROR_MEMORY;
-    if (count == 0)
-        goto cleanup;
     OV_TRY(ov_grid_of(context, places, stride, count, reach, &grid));
-    OV_TRY(ov_buffer_read(context, &points->xyz, 0, xyz, 3 * size * sizeof *xyz));
-    for (size_t k = 0; k < size; ++k) {
-        const float *const p = xyz + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
-        double at[3];
-        for (size_t axis = 0; axis < 3; ++axis)
-            at[axis] = points->origin[axis] + (double)p[axis * OV_PACK];
-        if (ov_grid_near(&grid, at, UINT32_MAX, near) > 0)
-            target->emphasis[k] = fminf(target->emphasis[k] * (float)factor, OV_EMPHASIS_MAX);
-    }
+    OV_TRY(ov_grid_of(context, places, stride, count, 2.0 * reach, &wide));
+    OV_TRY(ov_buffer_read(context, &target->points->xyz, 0, xyz, 3 * size * sizeof *xyz));
+    emphasise(target, xyz, &grid, &wide, (float)factor);
     for (size_t k = 0; k < size; ++k)
         xyz[k] = target->host_weight[k] * target->emphasis[k];
     OV_TRY(ov_buffer_write(context, &target->weight, 0, xyz, size * sizeof *xyz));
 cleanup:
     ov_grid_destroy(&grid);
+    ov_grid_destroy(&wide);
     free(xyz);
     return status;
 }

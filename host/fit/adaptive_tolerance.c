@@ -23,7 +23,7 @@
 #define LOCAL_FROM 3e-3
 /* The weight of points about a spot, each time it is met. */
 #define EMPHASIS_REACH 2.0
-#define EMPHASIS 1.3
+#define EMPHASIS 1.6
 /* Where growing gets stuck, a new start has so many times the ellipsoids. */
 #define RESTART 1.3
 /* Shrinking: the share that is merged at first, halved after a failure: a try that gains less than

@@ -5,8 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* How far (angstrom) ellipsoids may move and still find all points that matter to them. */
-#define REACH_SKIN 0.5f
+/* How far (angstrom) ellipsoids may move before the points that matter to them are looked for
+ * again.
+ */
+#define REACH_SKIN 1.0f
 
 /* ---- who moves, and who does not ------------------------------------------------------------ */
 
@@ -146,39 +148,88 @@ static void scatter(const double *some, size_t count, const bool *chosen, double
         }
 }
 
-static ovoid_status refine_chosen(ov_local *l, const ov_refine_options *options, double *x,
-                                  size_t count, const bool *chosen, double *misfit) {
-    const size_t some_count = l->moving.count;
-    double *const some =
-        ov_alloc(l->refiner.context, some_count * OV_FACTOR_PARAMETERS, sizeof *some, "parameters");
-    if (!some)
-        return OVOID_ERROR_MEMORY;
-    gather(x, count, chosen, some);
+/* Those that move, and where they were when their points were found. */
+typedef struct movers {
+    double *x, *found;
+    size_t count;
+    bool escaped; /* one of them to where points are missing */
+} movers;
+
+static bool escaped(const double *x, size_t count, void *where) {
+    movers *const m = where;
+    for (size_t i = 0; i < count && !m->escaped; ++i)
+        m->escaped =
+            ov_factor_motion(m->found + i * OV_FACTOR_PARAMETERS, x + i * OV_FACTOR_PARAMETERS,
+                             OV_REFINE_CUTOFF) > (double)REACH_SKIN;
+    return m->escaped;
+}
+
+/* Finds the points of those chosen and the target there, what the others leave of it; *kept: packs.
+ */
+static ovoid_status find_part(ov_local *l, const ov_target *target, const double *x, size_t count,
+                              const bool *chosen, size_t *kept) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(set_terms(l, target, x, count, chosen, true, REACH_SKIN, &l->moving));
+    OV_TRY(find_packs(l, target->points, kept));
+    if (*kept == 0)
+        goto cleanup;
+    OV_TRY(keep_packs(l, target->points, *kept));
+    OV_TRY(set_terms(l, target, x, count, chosen, false, 0.0f, &l->still));
+    OV_TRY(take_target(l, target, *kept));
     ov_refiner_forget(&l->refiner);
-    const ovoid_status status =
-        ov_refine(&l->refiner, &l->target, options, some, some_count, misfit);
-    if (status == OVOID_OK)
-        scatter(some, count, chosen, x);
-    free(some);
+cleanup:
+    return status;
+}
+
+/* Refines until somebody escapes, then finds the points anew. */
+static ovoid_status refine_movers(ov_local *l, const ov_target *target,
+                                  const ov_refine_options *options, double *x, size_t count,
+                                  const bool *chosen, movers *m, double *misfit) {
+    ovoid_status status = OVOID_OK;
+    ov_refine_options now = *options;
+    const uint64_t before = l->refiner.steps;
+    size_t kept;
+    now.enough = escaped;
+    now.where = m;
+    do {
+        m->escaped = false;
+        OV_TRY(find_part(l, target, x, count, chosen, &kept));
+        if (kept == 0)
+            break;
+        gather(x, count, chosen, m->x);
+        gather(x, count, chosen, m->found);
+        OV_TRY(ov_refine(&l->refiner, &l->target, &now, m->x, m->count, misfit));
+        scatter(m->x, count, chosen, x);
+        now.steps = options->steps - (uint32_t)(l->refiner.steps - before);
+    } while (m->escaped && now.steps > 0);
+cleanup:
     return status;
 }
 
 ovoid_status ov_refine_some(ov_local *l, const ov_target *target, const ov_refine_options *options,
                             double *x, size_t count, const bool *chosen, double *misfit) {
     ovoid_status status = OVOID_OK;
-    size_t kept = 0;
+    movers m = {0};
     *misfit = 0.0;
-    OV_TRY(set_terms(l, target, x, count, chosen, true, REACH_SKIN, &l->moving));
-    if (l->moving.count == 0)
+    for (size_t i = 0; i < count; ++i)
+        m.count += chosen[i];
+    if (m.count == 0)
+        return OVOID_OK;
+    double *const all = ov_alloc(l->refiner.context, count * OV_FACTOR_PARAMETERS, sizeof *all,
+                                 "parameters"); /* x stays as it is on errors */
+    m.x =
+        ov_alloc(l->refiner.context, 2 * m.count * OV_FACTOR_PARAMETERS, sizeof *m.x, "parameters");
+    if (!all || !m.x) {
+        status = OVOID_ERROR_MEMORY;
         goto cleanup;
-    OV_TRY(find_packs(l, target->points, &kept));
-    if (kept == 0)
-        goto cleanup;
-    OV_TRY(keep_packs(l, target->points, kept));
-    OV_TRY(set_terms(l, target, x, count, chosen, false, 0.0f, &l->still));
-    OV_TRY(take_target(l, target, kept));
-    OV_TRY(refine_chosen(l, options, x, count, chosen, misfit));
+    }
+    m.found = m.x + m.count * OV_FACTOR_PARAMETERS;
+    memcpy(all, x, count * OV_FACTOR_PARAMETERS * sizeof *all);
+    OV_TRY(refine_movers(l, target, options, all, count, chosen, &m, misfit));
+    memcpy(x, all, count * OV_FACTOR_PARAMETERS * sizeof *all);
 cleanup:
+    free(all);
+    free(m.x);
     return status;
 }
 

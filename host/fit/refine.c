@@ -217,6 +217,8 @@ ovoid_status ov_refine(ov_refiner *r, const ov_target *target, const ov_refine_o
             status = ov_fail(r->context, OVOID_ERROR_CANCELLED, "stopped while refining");
             goto cleanup;
         }
+        if (fresh && options->enough && options->enough(x, count, options->where))
+            break;
     }
 cleanup:
     return status;

@@ -20,6 +20,9 @@ typedef struct ov_refine_options {
     double width_max; /* angstrom: no axis becomes longer, 1 / sqrt(decay) */
     bool (*go_on)(uint32_t step, double misfit, void *user); /* may be NULL */
     void *user;
+    bool (*enough)(const double *x, size_t count, void *where); /* asked after steps that were
+                                                                   accepted; may be NULL */
+    void *where;
 } ov_refine_options;
 
 /* What one evaluation of a model leaves on the device. */

@@ -2,6 +2,9 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -234,9 +237,19 @@ static void open_standard_streams(void) {
             (void)!open("/dev/null", O_RDONLY | O_NOCTTY);
 }
 
+/* Large arrays of one stage are of no use to the next: glibc is to give them back when they are
+ * freed, where by default it begins to keep them after the first ones. */
+static void return_large_arrays(void) {
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 256 << 10);
+    mallopt(M_TRIM_THRESHOLD, 1 << 20);
+#endif
+}
+
 int main(int argc, char **argv) {
     static char buffer[1 << 16]; /* for any help, so that the flush below knows why it failed */
     open_standard_streams();
+    return_large_arrays();
     if (!isatty(STDOUT_FILENO))
         setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     cli_catch_signals();

@@ -23,6 +23,15 @@ void test_refused(ovoid_context *context, ovoid_status status, ovoid_status want
         fail_msg("\"%s\" is missing in \"%s\"", part, ovoid_context_error(context));
 }
 
+bool test_simulated(ovoid_context *context) {
+    return strstr(ovoid_context_device(context)->platform, "Oclgrind") != NULL;
+}
+
+void test_skip_simulated(ovoid_context *context) {
+    if (test_simulated(context))
+        skip();
+}
+
 int test_open(void **state) {
     ovoid_context *context = NULL;
     if (ovoid_context_create(&context) != OVOID_OK)

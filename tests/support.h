@@ -32,6 +32,11 @@ void test_check(ovoid_context *context, ovoid_status status);
 void test_refused(ovoid_context *context, ovoid_status status, ovoid_status wanted,
                   const char *part);
 
+/* Whether a simulator executes kernels: it takes minutes for what takes a device a second. */
+bool test_simulated(ovoid_context *context);
+/* Ends a test as skipped there: one of what the host does with kernels that others run there. */
+void test_skip_simulated(ovoid_context *context);
+
 /* Group fixtures: *state is a context with the device opened. */
 int test_open(void **state);
 int test_close(void **state);

@@ -51,11 +51,6 @@ static ovoid_fit_options options_of(ovoid_goal goal, double value) {
     return options;
 }
 
-/* Minutes for what takes a device a second. */
-static bool simulated(ovoid_context *context) {
-    return strstr(ovoid_context_device(context)->platform, "Oclgrind") != NULL;
-}
-
 /* A fit, and what is measured of it where both have a surface: `distance` of the result says. */
 typedef struct outcome {
     ovoid_model *model;
@@ -106,8 +101,7 @@ static void expect_pair(const ovoid_pair *pair, double wanted, double share_orig
 /* ---- goals -------------------------------------------------------------------------------- */
 
 static void numbers_of_ellipsoids(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const size_t atoms = test_size(24, 4);
     ovoid_molecule *molecule = random_chain(*state, atoms, 1);
     const size_t numbers[] = {1, 2, 7, atoms};
@@ -131,8 +125,7 @@ static void numbers_of_ellipsoids(void **state) {
 }
 
 static void ratios(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const size_t atoms = test_size(24, 4);
     ovoid_molecule *molecule = random_chain(*state, atoms, 2);
     const struct {
@@ -151,8 +144,7 @@ static void ratios(void **state) {
 
 /* Reached, and what is reached is measured, with fewer ellipsoids where it is less. */
 static void tolerances(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const size_t atoms = test_size(40, 4);
     ovoid_molecule *molecule = random_chain(*state, atoms, 3);
     const double values[] = {2.0, 0.8, 0.4, 0.2};
@@ -173,8 +165,7 @@ static void tolerances(void **state) {
 /* Tighter than any merge allows: in the end the atoms themselves. Without a step of refinement a
  * tolerance may be missed, and the result says so. */
 static void tolerances_out_of_reach(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const size_t atoms = test_size(12, 4);
     ovoid_molecule *molecule = random_chain(*state, atoms, 4);
     ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 1e-3);
@@ -228,7 +219,7 @@ static void one_atom(void **state) {
     const double xyzr[4] = {5.1, -6.2, 7.3, 1.7};
     ovoid_molecule *molecule = molecule_of(*state, xyzr, 1);
     expect_sphere(*state, molecule, options_of(OVOID_GOAL_ELLIPSOIDS, 1), 1, 1.7);
-    if (!simulated(*state)) {
+    if (!test_simulated(*state)) {
         expect_sphere(*state, molecule, options_of(OVOID_GOAL_RATIO, 0.01), 1, 1.7);
         expect_sphere(*state, molecule, options_of(OVOID_GOAL_TOLERANCE, 0.5), 1, 1.7);
     }
@@ -247,8 +238,7 @@ static void one_large_bead(void **state) {
 
 /* phi = 2 exp(-d (|x|^2 - r^2)): a sphere with r^2 + ln 2 / d. */
 static void coincident_atoms(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const double xyzr[8] = {1.0, 1.0, 1.0, 1.5, 1.0, 1.0, 1.0, 1.5};
     const double radius = sqrt(1.5 * 1.5 + 2.0 * log(2.0));
     ovoid_molecule *molecule = molecule_of(*state, xyzr, 2);
@@ -261,8 +251,7 @@ static void coincident_atoms(void **state) {
 /* Where the field nowhere reaches the isovalue, the model follows the field, and there is no
  * distance; a goal that is about surfaces holds. */
 static void no_surface(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const double bare[12] = {0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0};
     ovoid_molecule *molecule = molecule_of(*state, bare, 3);
     const ovoid_fit_options all[] = {options_of(OVOID_GOAL_TOLERANCE, 0.5),
@@ -279,8 +268,7 @@ static void no_surface(void **state) {
 
 /* Atoms of radius 0 count: about one of radius r, phi grows. */
 static void atoms_of_radius_zero(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const double xyzr[12] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     const double radius = sqrt(2.0 * log(exp(0.5 * 1.7 * 1.7) + 2.0));
     ovoid_molecule *molecule = molecule_of(*state, xyzr, 3);
@@ -291,8 +279,7 @@ static void atoms_of_radius_zero(void **state) {
 
 /* One ellipsoid cannot be in two places, two can. */
 static void pieces_far_apart(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const double apart = test_small() ? 9.0 : 30.0;
     const double xyzr[16] = {0.0,   0.0, 0.0, 1.7, 1.2,         0.5, 0.0, 1.5,
                              apart, 0.0, 0.0, 1.6, apart + 0.3, 1.2, 0.4, 1.6};
@@ -356,8 +343,7 @@ static void rod_content(const rod *r, double *area, double *volume) {
 
 /* The same numbers of ellipsoids, and areas and volumes within these bounds, on every device. */
 static void a_rod_equals_its_integral(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     enum { ROD_MAX = 8 };
     double xyzr[4 * ROD_MAX] = {0};
     const size_t atoms = test_size(ROD_MAX, 4);
@@ -401,8 +387,7 @@ static double score(const ovoid_measures *m) {
 }
 
 static void effort_helps(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     const size_t atoms = test_size(30, 4);
     ovoid_molecule *molecule = random_chain(*state, atoms, 5);
     double scores[2];
@@ -413,6 +398,8 @@ static void effort_helps(void **state) {
         assert_int_equal(o.result.ellipsoids, options.adaptive.ellipsoids);
         scores[effort - 1] = score(&o.measures);
         ovoid_model_destroy(&o.model);
+        if (test_small()) /* hundreds of launches more */
+            continue;
         options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
         options.adaptive.effort = effort;
         o = fit(*state, molecule, &options);
@@ -427,8 +414,7 @@ static void effort_helps(void **state) {
 /* ---- the same bits ------------------------------------------------------------------------ */
 
 static void two_fits_give_the_same_bits(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     ovoid_molecule *molecule = random_chain(*state, test_size(40, 4), 6);
     ovoid_fit_options all[] = {options_of(OVOID_GOAL_TOLERANCE, 0.4),
                                options_of(OVOID_GOAL_ELLIPSOIDS, (double)test_size(6, 2))};
@@ -478,8 +464,7 @@ static bool stop_there(const ovoid_progress *progress, void *user) {
 }
 
 static void a_stopped_fit_hands_over_nothing(void **state) {
-    if (simulated(*state))
-        skip();
+    test_skip_simulated(*state);
     ovoid_molecule *molecule = random_chain(*state, test_size(30, 4), 7);
     const struct {
         const char *stage;

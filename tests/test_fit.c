@@ -131,7 +131,8 @@ static void odd_molecules(void **state) {
     } cases[] = {{one, 1, 2.5},   {bare, 1, 2.0},       {bare, 1, 0.0},
                  {mixed, 3, 2.0}, {coincident, 2, 3.0}, {flat, 3, 0.0},
                  {flat, 3, 2.0},  {far, 2, 2.0},        {large, 1, 7.0}};
-    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; ++n) {
+    const size_t tried = test_simulated(*state) ? 4 : sizeof cases / sizeof cases[0];
+    for (size_t n = 0; n < tried; ++n) {
         ovoid_molecule *molecule = molecule_of(*state, cases[n].xyzr, cases[n].atoms);
         ovoid_fit_options options = short_options();
         options.padding = cases[n].padding;
@@ -144,6 +145,7 @@ static void odd_molecules(void **state) {
 /* ---- the same bits ------------------------------------------------------------------------ */
 
 static void two_fits_give_the_same_bits(void **state) {
+    test_skip_simulated(*state);
     ovoid_molecule *molecule = random_molecule(*state, test_size(60, 4), 2);
     ovoid_fit_options options = short_options();
     options.l1.prune_below = 1.6; /* so that pruning takes part */
@@ -194,6 +196,7 @@ static bool stop_there(const ovoid_progress *progress, void *user) {
 }
 
 static void a_stopped_fit_hands_over_nothing(void **state) {
+    test_skip_simulated(*state);
     ovoid_molecule *molecule = random_molecule(*state, 6, 3);
     const uint64_t stops[] = {0, 1, 3};
     for (size_t n = 0; n < 3; ++n) {
@@ -283,6 +286,7 @@ static void bad_options_are_named(void **state) {
 }
 
 static void defaults_are_accepted(void **state) {
+    test_skip_simulated(*state);
     const double xyzr[4] = {0.0, 0.0, 0.0, 1.7};
     ovoid_molecule *molecule = molecule_of(*state, xyzr, 1);
     ovoid_fit_options options;

@@ -63,7 +63,7 @@ static void gram_equals_twin(void **state) {
         bench b;
         double worst = 0.0;
         test_random random = {40};
-        bench_random(&b, *state, (model_kind)kind, test_size(60, 6), test_size(3001, 165),
+        bench_random(&b, *state, (model_kind)kind, test_size(60, 4), test_size(3001, 101),
                      800 + (uint64_t)kind);
         /* e^80 times quartics would leave the range of floats */
         float *const w = random_weights(&random, &b, kind == MODEL_HUGE ? 0x1p-40 : 1.0);
@@ -181,6 +181,7 @@ static void gram_is_the_quadratic_form_of_the_polynomial(void **state) {
 /* A term that meets thousands of packs, at points all alike: every addition to a sum rounds to the
  * same side, so one float total would drift far off. */
 static void long_lists_do_not_drift(void **state) {
+    test_skip_simulated(*state);
     const size_t count = test_size(400000, 2000);
     const ov_quadric quadric = {.amplitude = 1.0, .a = {1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6}};
     float *const xyz = test_alloc(3 * count, sizeof *xyz);
@@ -214,6 +215,7 @@ static void long_lists_do_not_drift(void **state) {
 
 /* Random points over a long list, error relative to the sum of magnitudes. */
 static void long_lists_are_accurate(void **state) {
+    test_skip_simulated(*state);
     const size_t count = test_size(200000, 2000);
     test_random random = {44};
     const ov_quadric quadric = {.amplitude = 1.5, .a = {0.2, 0.05, -0.04, 0.3, 0.02, 0.25}};
@@ -252,7 +254,7 @@ static void lattice_gives_gaussian_integrals(void **state) {
                                        .decay = {0.35, 0.5, 0.65},
                                        .centre = {0.25, -0.5, 0.125},
                                        .angle = {0.4, -0.7, 1.9}};
-    const double h = test_size(400, 625) / 1000.0, half = 5.5;
+    const double h = test_size(400, 720) / 1000.0, half = 5.5;
     const size_t side = (size_t)(2.0 * half / h) + 1, count = side * side * side;
     ov_quadric quadric;
     ov_quadric_of_ellipsoid(&ellipsoid, &quadric);
@@ -324,6 +326,7 @@ static void empty_lists_give_zeros(void **state) {
 
 /* The same bits every time. */
 static void gram_repeats_itself(void **state) {
+    test_skip_simulated(*state);
     bench b;
     test_random random = {46};
     bench_random(&b, *state, MODEL_RANDOM, test_size(40, 5), test_size(3001, 165), 990);

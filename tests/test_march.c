@@ -405,6 +405,7 @@ static void a_ring_has_a_hole(void **state) {
 
 /* Atoms on a sphere: an outer wall and that of the cavity, whose volume counts negative. */
 static void a_hollow_shell_has_two_walls(void **state) {
+    test_skip_simulated(*state);
     enum { MOST = 120 };
     double xyzr[4 * MOST];
     const size_t shell = test_size(MOST, 56);
@@ -630,6 +631,7 @@ static void values_equal_to_the_isovalue_are_inside(void **state) {
 
 /* A mesh does not change with the lattice indices of where it lies. */
 static void far_from_the_origin(void **state) {
+    test_skip_simulated(*state);
     test_random random = {13};
     const double far[3] = {40000.0, -90000.0, 262144.0};
     double here[4 * 10], there[4 * 10];
@@ -651,6 +653,7 @@ static void far_from_the_origin(void **state) {
 
 /* A box of 1e17 lattice points; what is evaluated follows the two atoms. */
 static void memory_follows_the_surface(void **state) {
+    test_skip_simulated(*state);
     static const uint64_t limits[][3] = {{4, 4, 4}, OV_MARCH_PIECE};
     const double xyzr[8] = {0.0, 0.0, 0.0, 1.5, 2e5, -3e5, 4e5, 1.5};
     const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
@@ -678,7 +681,8 @@ static void pieces_reach_as_far_as_the_surface(void **state) {
     const size_t box[3] = {BOX, BOX, BOX};
     const ovoid_mesh_options options = options_of(1.0, spacing, OVOID_VERTEX_LINEAR);
     test_random random = {15};
-    for (size_t k = 0; k < test_size(40, 2); ++k) {
+    const size_t tried = test_simulated(*state) ? 1 : test_size(40, 2);
+    for (size_t k = 0; k < tried; ++k) {
         double xyzr[4];
         for (int axis = 0; axis < 3; ++axis)
             xyzr[axis] = random_uniform(&random, -0.8, 0.8);
@@ -701,7 +705,8 @@ static void pieces_reach_as_far_as_the_surface(void **state) {
 static void tips_at_the_ends_of_pieces(void **state) {
     static const uint64_t limits[][3] = {{4, 2, 2}, {4, 4, 6}, {8, 6, 4}};
     const double decays[] = {0.5, 0.3, 0.77};
-    for (size_t k = 0; k < test_size(27, 1); ++k) {
+    const size_t first = test_simulated(*state) ? 9 : 0; /* with fewer pieces */
+    for (size_t k = first; k < first + test_size(27, 1); ++k) {
         const double xyzr[4] = {1.5, -2.0, 0.5, 1.0 + 0.5 * (double)(k % 3)};
         const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
         ov_body body;
@@ -714,6 +719,7 @@ static void tips_at_the_ends_of_pieces(void **state) {
 }
 
 static void two_runs_are_the_same(void **state) {
+    test_skip_simulated(*state);
     const size_t count = test_size(600, 20);
     const ovoid_mesh_options options = options_of(1.0, 0.4, OVOID_VERTEX_EXACT);
     static const uint64_t limit[3] = {16, 16, 16};

@@ -83,6 +83,7 @@ static void test_closed_forms(void **state) {
 
 /* The same field as atoms and as ellipsoids. */
 static void test_same_surface(void **state) {
+    test_skip_simulated(*state);
     ovoid_context *const context = *state;
     const double xyzr[12] = {0, 0, 0, 1.7, 1.5, 0.3, 0, 1.5, 8, 0, 0, 1.2};
     ovoid_ellipsoid ellipsoids[3];
@@ -120,6 +121,7 @@ static void test_same_surface(void **state) {
 /* A hollow ball against a full one: the walls of cavities count for the whole, not for the outer
  * surface. */
 static void test_cavity(void **state) {
+    test_skip_simulated(*state);
     ovoid_context *const context = *state;
     const int level = test_small() ? 2 : 4;
     shape hollow = {0}, full = {0};
@@ -148,6 +150,7 @@ static void test_cavity(void **state) {
 }
 
 static void test_refusals(void **state) {
+    test_skip_simulated(*state);
     ovoid_context *const context = *state;
     const double xyzr[4] = {0, 0, 0, 1.5};
     const ovoid_ellipsoid faint = {0.5, {1, 1, 1}, {0, 0, 0}, {0, 0, 0}};

@@ -672,6 +672,7 @@ static void worst_are_split(void **state) {
 
 /* Needles, pancakes and the like have one longest axis, or several that will all do. */
 static void splits_of_every_shape(void **state) {
+    test_skip_simulated(*state);
     test_random random = {92};
     model m;
     create_model(&m, *state, 6, 2.0, 93);

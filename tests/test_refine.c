@@ -191,6 +191,7 @@ static void a_mixture_is_found_again(void **state) {
 
 /* From far off and hardly damped, so that steps are rejected too. */
 static void the_misfit_never_rises(void **state) {
+    test_skip_simulated(*state);
     problem p;
     record r;
     ov_refiner refiner = {.context = *state};
@@ -224,6 +225,7 @@ static void the_misfit_never_rises(void **state) {
 /* After steps taken in old lists, fresh lists say the same but for what is cut off, and
  * refiner->now is of the accepted parameters. */
 static void lists_with_skins_say_the_same(void **state) {
+    test_skip_simulated(*state);
     for (uint32_t steps = 1; steps <= test_size(9, 1); steps += 2) {
         problem p;
         record r;
@@ -276,6 +278,7 @@ static void lists_follow_jumps(void **state) {
 }
 
 static void no_steps_change_nothing(void **state) {
+    test_skip_simulated(*state);
     problem p;
     record r;
     ov_refiner refiner = {.context = *state};
@@ -295,6 +298,7 @@ static void no_steps_change_nothing(void **state) {
 
 /* Few gains in a row end it early, and so does a model that fits already. */
 static void little_gain_ends_it(void **state) {
+    test_skip_simulated(*state);
     problem p;
     record r;
     ov_refiner refiner = {.context = *state};
@@ -315,6 +319,7 @@ static void little_gain_ends_it(void **state) {
 }
 
 static void cancelling_keeps_what_is_accepted(void **state) {
+    test_skip_simulated(*state);
     problem p;
     ov_refiner refiner = {.context = *state};
     ov_refine_options options = options_of(10);
@@ -338,6 +343,7 @@ static void cancelling_keeps_what_is_accepted(void **state) {
 
 /* Fresh or used, on a problem of the same or another size. */
 static void runs_repeat(void **state) {
+    test_skip_simulated(*state);
     problem p, other;
     record r;
     ov_refiner used = {.context = *state}, fresh = {.context = *state};
@@ -365,6 +371,7 @@ static void runs_repeat(void **state) {
 
 /* No axis becomes longer than asked for, and no ellipsoid jumps. */
 static void steps_are_bounded(void **state) {
+    test_skip_simulated(*state);
     problem p;
     record r;
     ov_refiner refiner = {.context = *state};
@@ -400,6 +407,7 @@ static void steps_are_bounded(void **state) {
 }
 
 static void a_broken_model_is_refused(void **state) {
+    test_skip_simulated(*state);
     problem p;
     ov_refiner refiner = {.context = *state};
     const ov_refine_options options = options_of(3);

@@ -132,7 +132,8 @@ static void rays_are_the_references(void **state) {
     const uint32_t side = (uint32_t)test_size(30, 4);
     const size_t terms = 12;
     const double c = 1.0, depth = 60.0;
-    for (size_t k = 0; k < sizeof kinds / sizeof kinds[0]; ++k) {
+    const size_t tried = test_simulated(*state) ? 1 : sizeof kinds / sizeof kinds[0];
+    for (size_t k = 0; k < tried; ++k) {
         test_random random = {k + 5};
         ov_quadric quadrics[12];
         size_t met = 0;
@@ -169,7 +170,8 @@ static void rays_are_the_references(void **state) {
 /* A sheet so thin that it lies between two steps of a ray. */
 static void thin_sheets_are_seen(void **state) {
     const double c = 1.0;
-    for (int k = 0; k < 12; ++k) {
+    const int step = test_simulated(*state) ? 6 : 1;
+    for (int k = 0; k < 12; k += step) {
         const double amplitude = 1.0 + 0.003 * (k + 1), decay = 3.0, z = 0.037 * k;
         const double half = sqrt(log(amplitude / c) / decay);
         const ov_quadric sheet = {amplitude, {0.0, 0.0, z}, {1e-3, 0.0, 0.0, 1e-3, 0.0, decay}};
@@ -645,6 +647,7 @@ static void overlay_shows_both(void **state) {
 }
 
 static void centres_are_marked(void **state) {
+    test_skip_simulated(*state);
     ovoid_model *model = make_sphere_model(*state, 4.0, exp(2.0), 0.5);
     const uint32_t side = (uint32_t)test_size(20, 12), middle = side / 2, off = side / 3;
     ovoid_picture_options options = small_picture(side, side);
@@ -685,6 +688,7 @@ static void panel_is_three_pictures(void **state) {
 }
 
 static void pictures_repeat_exactly(void **state) {
+    test_skip_simulated(*state);
     double xyzr[4 * 30];
     const size_t atoms = test_size(30, 8);
     test_random random = {13};

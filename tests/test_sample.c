@@ -203,6 +203,7 @@ static void exterior_points_are_kept(void **state) {
 /* More than 128 points along x and more than 64 along z: the lattice is evaluated in pieces, some
  * of them without any atom in reach. */
 static void lattice_of_several_pieces(void **state) {
+    test_skip_simulated(*state);
     const double half[3] = {test_size(45, 32), test_size(2, 0), test_size(21, 16)};
     double xyzr[4 * ATOMS];
     test_random random = {2};
@@ -229,6 +230,7 @@ static void lattice_of_several_pieces(void **state) {
 
 /* Pieces that no atom reaches lie outside, and belong to a band that begins at 0. */
 static void pieces_without_atoms(void **state) {
+    test_skip_simulated(*state);
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
     job j = {.xyzr = xyzr,
              .atoms = 2,
@@ -243,6 +245,7 @@ static void pieces_without_atoms(void **state) {
 
 /* Guards are every n-th point of the lattice, on the side where they are asked for. */
 static void guards_on_a_coarser_lattice(void **state) {
+    test_skip_simulated(*state);
     double xyzr[4 * ATOMS];
     test_random random = {3};
     random_atoms(&random, xyzr, ATOMS, (const double[3]){3.0, 2.0, 2.5});
@@ -274,6 +277,7 @@ static void guards_on_a_coarser_lattice(void **state) {
 /* Several pieces, their sizes no multiples of the guards' step; and guards of the outside that
  * reach down to 0, where pieces without atoms hold nothing else. */
 static void guards_in_pieces(void **state) {
+    test_skip_simulated(*state);
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
     job j = {.xyzr = xyzr,
              .atoms = 2,
@@ -334,6 +338,7 @@ static void odd_molecules(void **state) {
 
 /* Coincident atoms' phi is that of one, times their number. */
 static void band_follows_the_sum(void **state) {
+    test_skip_simulated(*state);
     const double two[] = {0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.5};
     const job one = {two, 1, 0.5, 0.5, 3.0, {.low = 0.5, .high = 1.1}},
               both = {two, 2, 0.5, 0.5, 3.0, {.low = 1.0, .high = 2.2}};

@@ -104,8 +104,9 @@ static inline void ov_box_distances(float px, float py, float pz, __global const
 }
 
 /* Squared distance to the nearest triangle of the leaves from first to end if that is below
- * `bound`, else bound. triangles: of these leaves. */
-static inline float ov_nearest(float px, float py, float pz, float bound, int levels,
+ * `bound`, else bound; to any triangle once that is at most `enough`. triangles: of these leaves.
+ */
+static inline float ov_nearest(float px, float py, float pz, float bound, float enough, int levels,
                                const uint *first_group, __global const float *boxes, uint first,
                                uint end, __global const float *triangles) {
     float distance[OV_LEVELS * OV_GROUP];      /* of the boxes of each level's current group */
@@ -113,7 +114,7 @@ static inline float ov_nearest(float px, float py, float pz, float bound, int le
     int level = levels - 1;
     bool fresh = true;
     group[level] = 0;
-    while (level < levels) {
+    while (level < levels && bound > enough) {
         float *const own = distance + level * OV_GROUP;
         if (fresh) {
             const size_t g = first_group[level] + group[level];
@@ -160,12 +161,13 @@ static inline float ov_nearest(float px, float py, float pz, float bound, int le
  * to end_leaf, which lie between low and high and whose triangles are given; with use_bound to them
  * or what squared[k] was before, whichever is less. For `each` consecutive points per work-item:
  * what one of them has found bounds the distance of the next. Infinite beyond what a float holds.
- */
+ * What is at most `enough` need not be the least, only as much as the distance or more. */
 __kernel void distances(const uint count, const uint each, __global const float *restrict xyz,
                         const ov_tree tree, __global const float *restrict boxes,
                         const uint first_leaf, const uint end_leaf, const float4 low,
                         const float4 high, __global const float *restrict triangles,
-                        const uint use_bound, __global float *restrict squared) {
+                        const uint use_bound, const float enough,
+                        __global float *restrict squared) {
     /* A copy, made where all work-items still run together: see lists.cl. */
     const int levels = (int)tree.levels;
     uint first_group[OV_LEVELS];
@@ -190,9 +192,9 @@ __kernel void distances(const uint count, const uint each, __global const float 
         }
         float limit = min(fma(reach, reach, FLT_MIN), most);
         /* A loop around one call: compilers that inline it do so once. */
-        for (;;) {
-            bound = ov_nearest(x, y, z, limit, levels, first_group, boxes, first_leaf, end_leaf,
-                               triangles);
+        for (bound = limit; limit > enough;) {
+            bound = ov_nearest(x, y, z, limit, enough, levels, first_group, boxes, first_leaf,
+                               end_leaf, triangles);
             if (bound < limit || limit == most)
                 break;
             limit = most;

@@ -470,11 +470,11 @@ static void a_stopped_fit_hands_over_nothing(void **state) {
         const char *stage;
         unsigned count;
         ovoid_goal goal;
-    } cases[] = {{"sample", 1, OVOID_GOAL_TOLERANCE},  {"merge", 1, OVOID_GOAL_ELLIPSOIDS},
-                 {"refine", 1, OVOID_GOAL_ELLIPSOIDS}, {"refine", 4, OVOID_GOAL_TOLERANCE},
-                 {"shrink", 1, OVOID_GOAL_TOLERANCE},  {"merge", 2, OVOID_GOAL_ELLIPSOIDS},
-                 {"grow", 2, OVOID_GOAL_TOLERANCE},    {"repair", 1, OVOID_GOAL_ELLIPSOIDS},
-                 {"repair", 9, OVOID_GOAL_ELLIPSOIDS}};
+    } cases[] = {{"sample", 1, OVOID_GOAL_TOLERANCE},  {"mesh", 1, OVOID_GOAL_TOLERANCE},
+                 {"merge", 1, OVOID_GOAL_ELLIPSOIDS},  {"refine", 1, OVOID_GOAL_ELLIPSOIDS},
+                 {"refine", 4, OVOID_GOAL_TOLERANCE},  {"shrink", 1, OVOID_GOAL_TOLERANCE},
+                 {"merge", 2, OVOID_GOAL_ELLIPSOIDS},  {"grow", 2, OVOID_GOAL_TOLERANCE},
+                 {"repair", 1, OVOID_GOAL_ELLIPSOIDS}, {"repair", 9, OVOID_GOAL_ELLIPSOIDS}};
     for (size_t n = 0; n < test_size(sizeof cases / sizeof *cases, 4); ++n) {
         stop s = {.stage = cases[n].stage, .count = cases[n].count};
         ovoid_fit_options options = options_of(

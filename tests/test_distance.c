@@ -233,6 +233,25 @@ static void test_twin(void **state) {
     shape_destroy(&s[1]);
 }
 
+/* What is further than enough is as far as ever, and what is not is told as no more than that. */
+static void expect_bounds(ovoid_context *context, const ovoid_mesh *from, const ovoid_mesh *to,
+                          const double origin[3], const float *exact) {
+    const double enough = 0.9;
+    size_t nearer = 0, looser = 0;
+    float *const got = test_alloc(from->vertices, sizeof *got);
+    test_check(context, ov_vertex_distances(context, from, to, origin, enough, NULL, got));
+    for (size_t v = 0; v < from->vertices; ++v) {
+        if (exact[v] > enough)
+            expect_near(got[v], exact[v], 1e-6, "a distance beyond enough");
+        else
+            assert_true(got[v] >= exact[v] - 1e-6f && got[v] <= enough + 1e-6);
+        nearer += exact[v] <= enough;
+        looser += got[v] > exact[v] + 1e-4f;
+    }
+    assert_true(nearer > 0 && nearer < from->vertices && looser > 0);
+    free(got);
+}
+
 /* Light meshes far from the origin of coordinates, and a vertex that nobody uses. */
 static void test_vertices(void **state) {
     ovoid_context *const context = *state;
@@ -263,7 +282,7 @@ static void test_vertices(void **state) {
         float *const got = test_alloc(from->vertices, sizeof *got);
         bool *const used = test_alloc(from->vertices, sizeof *used);
         got[0] = NAN;
-        test_check(context, ov_vertex_distances(context, from, to, middle, NULL, got));
+        test_check(context, ov_vertex_distances(context, from, to, middle, 0.0, NULL, got));
         for (size_t k = 0; k < 3 * from->triangles; ++k)
             used[from->corners[k]] = true;
         for (size_t v = 0; v < from->vertices; ++v)
@@ -271,6 +290,7 @@ static void test_vertices(void **state) {
                         used[v] ? reference_mesh_distance(full[n]->xyz + 3 * v, full[1 - n], false)
                                 : 0.0,
                         3e-6, "distance of a vertex");
+        expect_bounds(context, from, to, middle, got);
         free(used);
         free(got);
     }

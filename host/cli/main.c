@@ -241,8 +241,8 @@ static void open_standard_streams(void) {
  * freed, where by default it begins to keep them after the first ones. */
 static void return_large_arrays(void) {
 #ifdef __GLIBC__
-    mallopt(M_MMAP_THRESHOLD, 256 << 10);
-    mallopt(M_TRIM_THRESHOLD, 1 << 20);
+    mallopt(M_MMAP_THRESHOLD, 4 << 20);
+    mallopt(M_TRIM_THRESHOLD, 8 << 20);
 #endif
 }
 

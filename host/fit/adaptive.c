@@ -63,8 +63,11 @@ static ovoid_status prepare(ov_adaptive *f) {
                             &f->target));
     ov_buffer_destroy(&f->samples.value); /* the target has taken over what it needs */
     ov_buffer_destroy(&f->samples.gradient);
+    f->stage = "mesh";
+    f->count = f->atoms;
     OV_TRY(ov_judge_create(f->context, f->xyzr, f->atoms, options->decay, options->isovalue,
-                           options->adaptive.mesh_spacing, (ov_watch){0}, &f->judge));
+                           options->adaptive.mesh_spacing,
+                           (ov_watch){.go_on = ov_adaptive_report, .user = f}, &f->judge));
 cleanup:
     return status;
 }

@@ -41,7 +41,8 @@ void ov_trial_swap(ov_trial *a, ov_trial *b) {
 
 /* ---- progress ------------------------------------------------------------------------------- */
 
-static bool report(ov_adaptive *f) {
+bool ov_adaptive_report(void *fit) {
+    const ov_adaptive *const f = fit;
     const ovoid_progress progress = {.stage = f->stage,
                                      .iteration = f->steps,
                                      .ellipsoids = f->count,
@@ -58,7 +59,7 @@ static bool report_step(uint32_t step, double misfit, void *user) {
     (void)step;
     ++f->steps;
     f->misfit = misfit;
-    return report(f);
+    return ov_adaptive_report(f);
 }
 
 /* ---- parts ---------------------------------------------------------------------------------- */
@@ -135,7 +136,7 @@ ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial
     t->count = count;
     f->count = count;
     f->misfit = 0.0;
-    if (!report(f))
+    if (!ov_adaptive_report(f))
         status = ov_fail(f->context, OVOID_ERROR_CANCELLED, "stopped while merging");
 cleanup:
     return status;

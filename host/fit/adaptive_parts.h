@@ -48,6 +48,9 @@ typedef struct ov_trial {
     ov_judgement judgement;
 } ov_trial;
 
+/* Tells the caller where an ov_adaptive is; false: the caller has had enough. */
+bool ov_adaptive_report(void *fit);
+
 ovoid_status ov_trial_create(const ov_adaptive *f, ov_trial *t);
 void ov_trial_copy(const ov_trial *from, ov_trial *to);
 void ov_trial_swap(ov_trial *a, ov_trial *b);

@@ -29,7 +29,7 @@
 /* Shrinking: the share that is merged at first, halved after a failure: a try that gains less than
  * half of that; and failures at most. */
 #define SHRINK_SHARE 0.08
-#define FAILURES_PER_EFFORT 3
+#define FAILURES_PER_EFFORT 2
 /* Where merging was too much: what was merged this near to the spot (angstrom) is taken back, next
  * time further about, in so many rounds; who is within the margin adapts to it. */
 #define BACK_REACH 5.0

@@ -11,6 +11,8 @@
  * area's relative error (angstrom). */
 #define SCORE_WHOLE 0.3
 #define SCORE_AREA 10.0
+/* Where spots are looked for, distances below this share of theirs are only bounded. */
+#define ENOUGH 0.8
 
 static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
 
@@ -21,7 +23,8 @@ static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, si
     const ovoid_status status = ov_march_light(judge->context, bodies, count, &judge->meshing,
                                                piece_limit, judge->origin, &judge->watch, mesh);
     if (status == OVOID_OK) {
-        *content = ov_mesh_smooth(*mesh, false);
+        if (content)
+            *content = ov_mesh_smooth(*mesh, false);
         free((*mesh)->normals);
         (*mesh)->normals = NULL;
     }
@@ -141,78 +144,100 @@ static void judge_distances(const ovoid_mesh *mesh, const float *distance,
     }
 }
 
-/* Fills in the judgement of a mesh of the model, and the distances of both meshes' vertices. */
-static ovoid_status judge_mesh(ov_judge *judge, const ovoid_mesh *mesh, ov_content content,
-                               float *from_original, float *from_model, ov_judgement *judgement) {
+/* A model's mesh, and how far its vertices and those of the original are from the other surface. */
+typedef struct trial {
+    ovoid_mesh *mesh;
+    float *from_original, *from_model; /* NULL where there are no two outer surfaces */
+} trial;
+
+static void trial_destroy(trial *t) {
+    free(t->from_original);
+    free(t->from_model);
+    ovoid_mesh_destroy(&t->mesh);
+}
+
+static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
     ovoid_status status = OVOID_OK;
-    ov_judgement made = {.valid = true};
-    OV_TRY(ov_vertex_distances(judge->context, judge->mesh, mesh, judge->origin, &judge->watch,
-                               from_original));
-    OV_TRY(ov_vertex_distances(judge->context, mesh, judge->mesh, judge->origin, &judge->watch,
-                               from_model));
-    judge_distances(judge->mesh, from_original, &made);
-    judge_distances(mesh, from_model, &made);
-    made.area_error = fabs(content.area - judge->content.area) / judge->content.area;
-    made.volume_ratio = content.volume / judge->content.volume;
-    made.score = made.deviation + SCORE_WHOLE * (made.hausdorff - made.deviation) +
-                 SCORE_AREA * made.area_error;
-    *judgement = made;
+    ovoid_context *const context = judge->context;
+    t->from_original =
+        ov_alloc(context, judge->mesh->vertices, sizeof *t->from_original, "distances");
+    t->from_model = ov_alloc(context, t->mesh->vertices, sizeof *t->from_model, "distances");
+    if (!t->from_original || !t->from_model) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    OV_TRY(ov_vertex_distances(context, judge->mesh, t->mesh, judge->origin, enough, &judge->watch,
+                               t->from_original));
+    OV_TRY(ov_vertex_distances(context, t->mesh, judge->mesh, judge->origin, enough, &judge->watch,
+                               t->from_model));
 cleanup:
     return status;
+}
+
+/* content may be NULL. */
+static ovoid_status try_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                              double enough, trial *t, ov_content *content,
+                              ov_judgement *judgement) {
+    ovoid_status status = OVOID_OK;
+    *judgement = (ov_judgement){.hausdorff = INFINITY, .deviation = INFINITY, .score = INFINITY};
+    OV_TRY(mesh_model(judge, quadrics, count, &t->mesh, content));
+    if (!has_outer(t->mesh) || !has_outer(judge->mesh))
+        goto cleanup;
+    OV_TRY(measure_trial(judge, enough, t));
+    *judgement =
+        (ov_judgement){.valid = true, .area_error = NAN, .volume_ratio = NAN, .score = NAN};
+    judge_distances(judge->mesh, t->from_original, judgement);
+    judge_distances(t->mesh, t->from_model, judgement);
+cleanup:
+    return status;
+}
+
+/* *spots: of the trial's surfaces; free with free(). */
+static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least, double apart,
+                                  size_t most, ov_spot **spots, size_t *spot_count) {
+    size_t room = 0;
+    *spot_count = 0;
+    add_spots(judge->mesh, t->from_original, least, NULL, &room);
+    add_spots(t->mesh, t->from_model, least, NULL, &room);
+    *spots = ov_alloc(judge->context, room, sizeof **spots, "spots");
+    if (!*spots)
+        return OVOID_ERROR_MEMORY;
+    add_spots(judge->mesh, t->from_original, least, *spots, spot_count);
+    add_spots(t->mesh, t->from_model, least, *spots, spot_count);
+    thin_spots(*spots, spot_count, apart, most);
+    return OVOID_OK;
 }
 
 ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
                             double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
                             size_t *spot_count) {
     ovoid_status status = OVOID_OK;
-    ovoid_context *const context = judge->context;
-    ovoid_mesh *mesh = NULL;
-    float *from_original = NULL, *from_model = NULL;
-    ov_spot *found = NULL;
-    size_t found_count = 0, room = 0;
-    ov_content content;
-    *judgement = (ov_judgement){.hausdorff = INFINITY, .deviation = INFINITY, .score = INFINITY};
-    OV_TRY(mesh_model(judge, quadrics, count, &mesh, &content));
-    if (has_outer(mesh) && has_outer(judge->mesh)) {
-        from_original =
-            ov_alloc(context, judge->mesh->vertices, sizeof *from_original, "distances");
-        from_model = ov_alloc(context, mesh->vertices, sizeof *from_model, "distances");
-        if (!from_original || !from_model) {
-            status = OVOID_ERROR_MEMORY;
-            goto cleanup;
-        }
-        OV_TRY(judge_mesh(judge, mesh, content, from_original, from_model, judgement));
-        add_spots(judge->mesh, from_original, least, NULL, &room);
-        add_spots(mesh, from_model, least, NULL, &room);
-        found = ov_alloc(context, room, sizeof *found, "spots");
-        if (!found) {
-            status = OVOID_ERROR_MEMORY;
-            goto cleanup;
-        }
-        add_spots(judge->mesh, from_original, least, found, &found_count);
-        add_spots(mesh, from_model, least, found, &found_count);
-        thin_spots(found, &found_count, apart, most);
-    }
+    trial t = {0};
+    *spots = NULL;
+    *spot_count = 0;
+    OV_TRY(try_model(judge, quadrics, count, ENOUGH * least, &t, NULL, judgement));
+    if (judgement->valid)
+        OV_TRY(collect_spots(judge, &t, least, apart, most, spots, spot_count));
 cleanup:
-    free(from_original);
-    free(from_model);
-    ovoid_mesh_destroy(&mesh);
-    if (status == OVOID_OK) {
-        *spots = found;
-        *spot_count = found_count;
-    } else {
-        free(found);
-    }
+    trial_destroy(&t);
     return status;
 }
 
 ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
                             ov_judgement *judgement) {
-    ov_spot *spots = NULL;
-    size_t spot_count;
-    const ovoid_status status =
-        ov_judge_spots(judge, quadrics, count, INFINITY, 0.0, 0, judgement, &spots, &spot_count);
-    free(spots);
+    ovoid_status status = OVOID_OK;
+    trial t = {0};
+    ov_content content;
+    OV_TRY(try_model(judge, quadrics, count, 0.0, &t, &content, judgement));
+    if (!judgement->valid)
+        goto cleanup;
+    judgement->area_error = fabs(content.area - judge->content.area) / judge->content.area;
+    judgement->volume_ratio = content.volume / judge->content.volume;
+    judgement->score = judgement->deviation +
+                       SCORE_WHOLE * (judgement->hausdorff - judgement->deviation) +
+                       SCORE_AREA * judgement->area_error;
+cleanup:
+    trial_destroy(&t);
     return status;
 }
 

@@ -42,8 +42,9 @@ void ov_judge_destroy(ov_judge *judge);
 ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
                             ov_judgement *judgement);
 
-/* As ov_judge_model(), with the *spot_count places where the deviation is at least `least`, largest
- * first, none nearer to another than `apart`, at most `most`. *spots is to be freed. */
+/* The *spot_count places where the deviation is at least `least`, largest first, none nearer to
+ * another than `apart`, at most `most`. *spots is to be freed. Of the judgement hausdorff and
+ * deviation are filled in, exact where they are not much below `least`, else only bounds. */
 ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
                             double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
                             size_t *spot_count);

@@ -240,6 +240,7 @@ static ovoid_status measure_batch(ovoid_context *context, measuring *m, const fl
     const ov_facets *const facets = m->facets;
     const cl_uint total = (cl_uint)count, each = m->each, first_leaf = (cl_uint)m->first,
                   end_leaf = (cl_uint)m->end, use_bound = m->use_bound;
+    const cl_float enough = (cl_float)(facets->enough * facets->enough);
     const cl_float4 low = {{m->box[0], m->box[1], m->box[2], 0.0f}},
                     high = {{m->box[3], m->box[4], m->box[5], 0.0f}};
     OV_TRY(ov_buffer_write(context, &m->xyz, 0, xyz, 3 * count * sizeof *xyz));
@@ -249,7 +250,7 @@ static ovoid_status measure_batch(ovoid_context *context, measuring *m, const fl
                      OV_ARG(each), OV_ARG(m->xyz.memory), OV_ARG(m->tree),
                      OV_ARG(facets->boxes.memory), OV_ARG(first_leaf), OV_ARG(end_leaf),
                      OV_ARG(low), OV_ARG(high), OV_ARG(facets->leaves.memory), OV_ARG(use_bound),
-                     OV_ARG(m->result.memory)));
+                     OV_ARG(enough), OV_ARG(m->result.memory)));
     OV_TRY(ov_buffer_read(context, &m->result, 0, squared, count * sizeof *squared));
 cleanup:
     return status;
@@ -352,7 +353,7 @@ static void put_distances(const ov_trail *trail, const float *squared, float *di
 }
 
 ovoid_status ov_vertex_distances(ovoid_context *context, const ovoid_mesh *from,
-                                 const ovoid_mesh *to, const double origin[3],
+                                 const ovoid_mesh *to, const double origin[3], double enough,
                                  const ov_watch *watch, float *distance) {
     ovoid_status status = OVOID_OK;
     ov_trail points = {0}, triangles = {0};
@@ -363,6 +364,7 @@ ovoid_status ov_vertex_distances(ovoid_context *context, const ovoid_mesh *from,
     OV_TRY(ov_facets_create(context, &triangles, origin, &facets));
     const ov_sites sites = {.count = points.vertices, .trail = &points};
     facets.watch = watch;
+    facets.enough = enough;
     if (points.vertex) {
         squared = ov_alloc(context, sites.count, sizeof *squared, "distances");
         if (!squared) {

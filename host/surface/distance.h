@@ -25,6 +25,7 @@ typedef struct ov_facets {
     double origin[3];      /* angstrom, subtracted before rounding to float */
     size_t chunk, batch;   /* as above, or less in tests */
     const ov_watch *watch; /* asked before each batch; may be NULL */
+    double enough; /* angstrom: a distance of at most this may be told as more, up to this */
     ov_tree tree;
     ov_buffer boxes;  /* device: the tree's boxes */
     ov_buffer leaves; /* device: the current chunk as kernels/distance.cl has it */
@@ -50,9 +51,9 @@ ovoid_status ov_facets_distances(ovoid_context *context, ov_facets *facets, cons
                                  float *squared);
 
 /* distance[v] of each vertex of `from` that is in a triangle to the surface `to`; 0 for others.
- * watch may be NULL. */
+ * enough: as in ov_facets; watch may be NULL. */
 ovoid_status ov_vertex_distances(ovoid_context *context, const ovoid_mesh *from,
-                                 const ovoid_mesh *to, const double origin[3],
+                                 const ovoid_mesh *to, const double origin[3], double enough,
                                  const ov_watch *watch, float *distance);
 
 /* ovoid_mesh_distances() that tells the distance of each vertex of both meshes, where not NULL;

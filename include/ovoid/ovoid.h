@@ -287,11 +287,12 @@ typedef enum ovoid_method {
 } ovoid_method;
 
 /* What a progress callback sees: while sampling after each piece of the lattice (with the points so
- * far), then after each iteration. */
+ * far), then after each iteration, and of adaptive between the pieces of what is meshed and
+ * measured (with the iteration before). */
 typedef struct ovoid_progress {
-    const char *stage;   /* "sample"; of l1 "sparse" or "accuracy"; of adaptive "merge", "refine",
-                            "repair", "grow" or "shrink" */
-    uint64_t iteration;  /* 1 .. iterations; 0 while sampling */
+    const char *stage;   /* "sample"; of l1 "sparse" or "accuracy"; of adaptive "mesh", "merge",
+                            "refine", "repair", "grow" or "shrink" */
+    uint64_t iteration;  /* 1 .. iterations; 0 before the first */
     uint64_t iterations; /* how many there will be at most; 0 where nobody knows (adaptive) */
     uint64_t ellipsoids;
     uint64_t points;

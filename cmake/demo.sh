@@ -43,9 +43,9 @@ atoms=$(number atoms)
 ellipsoids=$(number ellipsoids)
 awk -v atoms="$atoms" -v ellipsoids="$ellipsoids" -v largest="$(number deviation)" \
     -v mean="$(number mean_distance_outer)" 'BEGIN {
-    printf "\n%d atoms became %d ellipsoids: %.1f atoms for each. Their surface is nowhere further\n",
+    printf "\n%d atoms became %d ellipsoids: %.1f atoms for each. Their outer surface is nowhere\n",
            atoms, ellipsoids, atoms / ellipsoids
-    printf "than %.2f Å from that of the atoms, and %.2f Å in the mean.\n", largest, mean
+    printf "further than %.2f Å from that of the atoms, and %.2f Å in the mean.\n", largest, mean
 }'
 cat <<END
 

@@ -107,6 +107,9 @@ ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t o
                              const void *data, size_t bytes);
 ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, size_t offset,
                             void *data, size_t bytes);
+/* ov_buffer_reserve() and ov_buffer_write() in one. */
+ovoid_status ov_buffer_put(ovoid_context *context, ov_buffer *buffer, const void *data,
+                           size_t bytes, const char *what);
 
 /* Waits until everything enqueued has run. */
 ovoid_status ov_finish(ovoid_context *context);

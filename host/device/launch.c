@@ -165,6 +165,12 @@ ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t o
     return copy ? OVOID_OK : idle(context);
 }
 
+ovoid_status ov_buffer_put(ovoid_context *context, ov_buffer *buffer, const void *data,
+                           size_t bytes, const char *what) {
+    const ovoid_status status = ov_buffer_reserve(context, buffer, bytes, what);
+    return status != OVOID_OK ? status : ov_buffer_write(context, buffer, 0, data, bytes);
+}
+
 ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, size_t offset,
                             void *data, size_t bytes) {
     if (!bytes)

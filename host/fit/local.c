@@ -95,14 +95,6 @@ cleanup:
 
 /* ---- the target ------------------------------------------------------------------------------ */
 
-static ovoid_status upload(ovoid_context *context, ov_buffer *buffer, const float *data,
-                           size_t count) {
-    const ovoid_status status =
-        ov_buffer_reserve(context, buffer, count * sizeof *data, "targets at points");
-    return status != OVOID_OK ? status
-                              : ov_buffer_write(context, buffer, 0, data, count * sizeof *data);
-}
-
 /* Whoever stays still leaves that much less of the target to the others. */
 static ovoid_status take_target(ov_local *l, const ov_target *target, size_t kept) {
     ovoid_status status = OVOID_OK;
@@ -121,9 +113,11 @@ static ovoid_status take_target(ov_local *l, const ov_target *target, size_t kep
         high[k] = target->host_high[from] - still[k];
         weight[k] = target->host_weight[from] * target->emphasis[from];
     }
-    OV_TRY(upload(context, &l->target.low, low, size));
-    OV_TRY(upload(context, &l->target.high, high, size));
-    OV_TRY(upload(context, &l->target.weight, weight, size));
+    OV_TRY(ov_buffer_put(context, &l->target.low, low, size * sizeof(float), "targets at points"));
+    OV_TRY(
+        ov_buffer_put(context, &l->target.high, high, size * sizeof(float), "targets at points"));
+    OV_TRY(ov_buffer_put(context, &l->target.weight, weight, size * sizeof(float),
+                         "targets at points"));
     l->target.points = &l->points;
 cleanup:
     free(still);

@@ -42,14 +42,6 @@ static void set_bounds(ov_target *target, size_t k) {
     target->host_high[k] = phi > to ? FLT_MAX : phi < from ? (float)from : (float)phi;
 }
 
-static ovoid_status upload(ovoid_context *context, ov_buffer *buffer, const float *data,
-                           size_t count) {
-    const ovoid_status status =
-        ov_buffer_reserve(context, buffer, count * sizeof *data, "targets at points");
-    return status != OVOID_OK ? status
-                              : ov_buffer_write(context, buffer, 0, data, count * sizeof *data);
-}
-
 /* Reads phi and its slope at the points. */
 static ovoid_status read_samples(ovoid_context *context, const ov_samples *samples, double floor,
                                  ov_target *target) {
@@ -88,7 +80,8 @@ ovoid_status ov_target_window(ovoid_context *context, ov_target *target, double 
     }
     for (size_t k = 0; k < count; ++k)
         target->emphasis[k] = 1.0f;
-    return upload(context, &target->weight, target->host_weight, count);
+    return ov_buffer_put(context, &target->weight, target->host_weight, count * sizeof(float),
+                         "targets at points");
 }
 
 ovoid_status ov_target_create(ovoid_context *context, const ov_samples *samples, double decay,
@@ -108,8 +101,10 @@ ovoid_status ov_target_create(ovoid_context *context, const ov_samples *samples,
         read_samples(context, samples, options->slope_min * isovalue * sqrt(2.0 * decay), &made));
     for (size_t k = 0; k < samples->points.count; ++k)
         set_bounds(&made, k);
-    OV_TRY(upload(context, &made.low, made.host_low, count));
-    OV_TRY(upload(context, &made.high, made.host_high, count));
+    OV_TRY(ov_buffer_put(context, &made.low, made.host_low, count * sizeof(float),
+                         "targets at points"));
+    OV_TRY(ov_buffer_put(context, &made.high, made.host_high, count * sizeof(float),
+                         "targets at points"));
     OV_TRY(ov_target_window(context, &made, options->window, options->floor));
 cleanup:
     if (status == OVOID_OK)

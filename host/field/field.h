@@ -36,6 +36,9 @@ void ov_points_destroy(ov_points *points);
 ovoid_status ov_points_upload(ovoid_context *context, const float *packed, const float *leaves,
                               ov_points *points);
 
+/* The box about the OV_PACK x, y, z of a pack: low x, y, z, high x, y, z. */
+void ov_pack_box(const float *pack, float box[6]);
+
 /* Index of cell (x, y, z), `bits` bits each (1 to 21), along the Hilbert curve. */
 uint64_t ov_hilbert_index(uint32_t x, uint32_t y, uint32_t z, unsigned bits);
 

@@ -124,9 +124,8 @@ static ovoid_status make_pack_lists(ovoid_context *context, ov_lists *lists, con
                        "more than 2^32 pairs of ellipsoids and packs of points; use a larger "
                        "spacing");
     lists->items = (size_t)items;
-    OV_TRY(ov_buffer_reserve(context, &lists->place, (p->bins + p->groups) * sizeof *bins,
-                             "starts of lists"));
-    OV_TRY(ov_buffer_write(context, &lists->place, 0, bins, (p->bins + p->groups) * sizeof *bins));
+    OV_TRY(ov_buffer_put(context, &lists->place, bins, (p->bins + p->groups) * sizeof *bins,
+                         "starts of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->group_term, entries * sizeof(cl_uint),
                              "groups of packs"));
     OV_TRY(ov_buffer_reserve(context, &lists->group_bits, entries * sizeof(cl_ushort),
@@ -152,10 +151,8 @@ static ovoid_status make_term_lists(ovoid_context *context, ov_lists *lists, con
     ovoid_status status = OVOID_OK;
     uint32_t *const start = lists->scan + p->counters;
     start[p->terms] = (uint32_t)turn_to_starts(start, p->terms);
-    OV_TRY(ov_buffer_reserve(context, &lists->term_start, (p->terms + (size_t)1) * sizeof *start,
-                             "starts of lists"));
-    OV_TRY(ov_buffer_write(context, &lists->term_start, 0, start,
-                           (p->terms + (size_t)1) * sizeof *start));
+    OV_TRY(ov_buffer_put(context, &lists->term_start, start, (p->terms + (size_t)1) * sizeof *start,
+                         "starts of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * sizeof(cl_uint),
                              "packs of ellipsoids"));
     OV_TRY(OV_LAUNCH(context, &lists->lists_of_terms, p->terms, p->group, OV_ARG(p->terms),

@@ -134,21 +134,29 @@ static ovoid_status order_points(ovoid_context *context, const float *xyz, size_
     return status;
 }
 
+void ov_pack_box(const float *pack, float box[BOX]) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const float *const at = pack + axis * OV_PACK;
+        box[axis] = box[axis + 3] = at[0];
+        for (size_t k = 1; k < OV_PACK; ++k) {
+            box[axis] = fminf(box[axis], at[k]);
+            box[axis + 3] = fmaxf(box[axis + 3], at[k]);
+        }
+    }
+}
+
 /* Fills packed with the points in pack order and leaves with the packs' boxes. */
 static void pack_points(const float *xyz, const ov_points *points, float *packed, float *leaves) {
     for (size_t pack = 0; pack < points->packs; ++pack) {
-        float *const box = leaves + pack * BOX;
-        empty_box(box);
+        float *const own = packed + pack * (3 * OV_PACK);
         for (size_t j = 0; j < OV_PACK; ++j) {
             const size_t k = pack * OV_PACK + j;
             const uint32_t from = points->order[k < points->count ? k : points->count - 1];
             const float *const p = xyz + 3 * (size_t)from;
-            for (size_t axis = 0; axis < 3; ++axis) {
-                packed[pack * (3 * OV_PACK) + axis * OV_PACK + j] = p[axis];
-                box[axis] = fminf(box[axis], p[axis]);
-                box[axis + 3] = fmaxf(box[axis + 3], p[axis]);
-            }
+            for (size_t axis = 0; axis < 3; ++axis)
+                own[axis * OV_PACK + j] = p[axis];
         }
+        ov_pack_box(own, leaves + pack * BOX);
     }
 }
 
@@ -159,10 +167,8 @@ ovoid_status ov_points_upload(ovoid_context *context, const float *packed, const
     size_t floats = 0;
     const size_t bytes = points->packs * 3 * OV_PACK * sizeof *packed;
     OV_TRY(ov_tree_build(context, leaves, points->packs, &points->tree, &boxes, &floats));
-    OV_TRY(ov_buffer_reserve(context, &points->xyz, bytes, "points"));
-    OV_TRY(ov_buffer_write(context, &points->xyz, 0, packed, bytes));
-    OV_TRY(ov_buffer_reserve(context, &points->boxes, floats * sizeof *boxes, "boxes of packs"));
-    OV_TRY(ov_buffer_write(context, &points->boxes, 0, boxes, floats * sizeof *boxes));
+    OV_TRY(ov_buffer_put(context, &points->xyz, packed, bytes, "points"));
+    OV_TRY(ov_buffer_put(context, &points->boxes, boxes, floats * sizeof *boxes, "boxes of packs"));
 cleanup:
     free(boxes);
     return status;

@@ -81,8 +81,8 @@ ovoid_status ov_terms_set_skins(ovoid_context *context, ov_terms *terms, const o
     for (size_t i = 0; skins && i < count; ++i)
         terms->host[i].skin = skins[i];
     terms->count = count;
-    OV_TRY(ov_buffer_reserve(context, &terms->device, count * sizeof *terms->host, "terms"));
-    OV_TRY(ov_buffer_write(context, &terms->device, 0, terms->host, count * sizeof *terms->host));
+    OV_TRY(
+        ov_buffer_put(context, &terms->device, terms->host, count * sizeof *terms->host, "terms"));
 cleanup:
     return status;
 }

@@ -56,17 +56,6 @@ cleanup:
     return status;
 }
 
-static void box_of(const float *pack, float box[6]) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-        const float *const at = pack + axis * OV_PACK;
-        box[axis] = box[axis + 3] = at[0];
-        for (size_t k = 1; k < OV_PACK; ++k) {
-            box[axis] = fminf(box[axis], at[k]);
-            box[axis + 3] = fmaxf(box[axis + 3], at[k]);
-        }
-    }
-}
-
 /* Copies the packs listed: they lie along the same curve. */
 static ovoid_status keep_packs(ov_local *l, const ov_points *points, size_t kept) {
     ovoid_status status = OVOID_OK;
@@ -81,7 +70,7 @@ static ovoid_status keep_packs(ov_local *l, const ov_points *points, size_t kept
     OV_TRY(ov_buffer_read(context, &points->xyz, 0, packed, points->packs * size * sizeof *packed));
     for (size_t n = 0; n < kept; ++n) {
         memmove(packed + n * size, packed + l->packs[n] * size, size * sizeof *packed);
-        box_of(packed + n * size, leaves + 6 * n);
+        ov_pack_box(packed + n * size, leaves + 6 * n);
     }
     l->points.packs = kept;
     l->points.count = kept * OV_PACK;

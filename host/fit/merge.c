@@ -111,8 +111,7 @@ static ovoid_status upload_pairs(ov_refiner *r, ov_merger *m, const ov_target *t
     }
     OV_TRY(ov_terms_set(r->context, &m->merged, merged, listed, target->points->origin,
                         OV_REFINE_CUTOFF));
-    OV_TRY(ov_buffer_reserve(r->context, &m->pairs, 2 * listed * sizeof *pairs, "pairs"));
-    OV_TRY(ov_buffer_write(r->context, &m->pairs, 0, pairs, 2 * listed * sizeof *pairs));
+    OV_TRY(ov_buffer_put(r->context, &m->pairs, pairs, 2 * listed * sizeof *pairs, "pairs"));
 cleanup:
     free(pairs);
     free(merged);
@@ -254,8 +253,7 @@ static ovoid_status upload_blame(ov_refiner *r, ov_merger *m, size_t points) {
     OV_TRY(ov_buffer_read(r->context, &r->now.value, 0, value, points * sizeof *value));
     for (size_t k = 0; k < points; ++k)
         u[k] = weight[k] > 0.0f ? u[k] * (u[k] / weight[k]) / fmaxf(value[k], SHARED_MIN) : 0.0f;
-    OV_TRY(ov_buffer_reserve(r->context, &m->u, points * sizeof *u, "residuals"));
-    OV_TRY(ov_buffer_write(r->context, &m->u, 0, u, points * sizeof *u));
+    OV_TRY(ov_buffer_put(r->context, &m->u, u, points * sizeof *u, "residuals"));
 cleanup:
     free(u);
     free(weight);

@@ -134,20 +134,13 @@ static void point_of(const ov_points *points, const float *xyz, size_t k, double
 
 /* The middle of a pack's box; returns the half of its diagonal. */
 static double middle_of(const ov_points *points, const float *xyz, size_t pack, double middle[3]) {
-    double low[3], high[3], square = 0.0;
-    point_of(points, xyz, pack * OV_PACK, low);
-    memcpy(high, low, sizeof high);
-    for (size_t k = 1; k < OV_PACK; ++k) {
-        double at[3];
-        point_of(points, xyz, pack * OV_PACK + k, at);
-        for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = fmin(low[axis], at[axis]);
-            high[axis] = fmax(high[axis], at[axis]);
-        }
-    }
+    float box[6];
+    double square = 0.0;
+    ov_pack_box(xyz + pack * (3 * OV_PACK), box);
     for (int axis = 0; axis < 3; ++axis) {
-        middle[axis] = 0.5 * (low[axis] + high[axis]);
-        square += (high[axis] - low[axis]) * (high[axis] - low[axis]);
+        const double low = box[axis], high = box[axis + 3];
+        middle[axis] = points->origin[axis] + 0.5 * (low + high);
+        square += (high - low) * (high - low);
     }
     return 0.5 * sqrt(square);
 }

@@ -109,7 +109,7 @@ _Static_assert(OV_LEAF == OV_GROUP, "coarse leaves are groups of leaves");
 /* Leaves are packed so many at a time, so that the host holds few of them. */
 #define PIECE_LEAVES ((size_t)2048)
 
-/* The leaves from first to end onto the device; the box about them. */
+/* The leaves from first to end onto the device; the box about them, where it is not NULL. */
 static ovoid_status load_leaves(ovoid_context *context, ov_facets *facets, bool coarse,
                                 size_t first, size_t end, float box[BOX]) {
     ovoid_status status = OVOID_OK;
@@ -118,7 +118,8 @@ static ovoid_status load_leaves(ovoid_context *context, ov_facets *facets, bool 
     float *const packed = ov_alloc(context, piece * leaf_floats, sizeof *packed, "triangles");
     if (!packed)
         return OVOID_ERROR_MEMORY;
-    empty_box(box);
+    if (box)
+        empty_box(box);
     OV_TRY(
         ov_buffer_reserve(context, &facets->leaves, (end - first) * bytes, "triangles of a mesh"));
     for (size_t from = first, count; from < end; from += count) {
@@ -129,8 +130,8 @@ static ovoid_status load_leaves(ovoid_context *context, ov_facets *facets, bool 
             round_triangle(
                 facets, coarse ? coarse_triangle_of(facets, leaf, j) : triangle_of(facets, leaf, j),
                 p);
-            put_triangle(p, packed + k / OV_LEAF * leaf_floats, k % OV_LEAF);
-            for (size_t i = 0; i < 3; ++i)
+            put_triangle(p, packed + k / OV_LEAF * leaf_floats, j);
+            for (size_t i = 0; box && i < 3; ++i)
                 widen_box(box, p[i]);
         }
         OV_TRY(ov_buffer_write(context, &facets->leaves, (from - first) * bytes, packed,
@@ -167,8 +168,7 @@ ovoid_status ov_facets_create(ovoid_context *context, const ov_trail *trail, con
     for (size_t leaf = 0; leaf < leaves; ++leaf)
         box_leaf(&made, leaf, boxes + leaf * BOX);
     OV_TRY(ov_tree_build(context, boxes, leaves, &made.tree, &tree, &floats));
-    OV_TRY(ov_buffer_reserve(context, &made.boxes, floats * sizeof *tree, "boxes of triangles"));
-    OV_TRY(ov_buffer_write(context, &made.boxes, 0, tree, floats * sizeof *tree));
+    OV_TRY(ov_buffer_put(context, &made.boxes, tree, floats * sizeof *tree, "boxes of triangles"));
     *facets = made;
 cleanup:
     if (status != OVOID_OK)
@@ -198,7 +198,7 @@ typedef struct measuring {
     bool use_bound;    /* the distances are bounds already */
     ov_tree tree;      /* over the leaves */
     size_t first, end; /* leaves on the device */
-    float box[BOX];    /* about these */
+    float box[BOX];    /* about these, with use_bound */
 } measuring;
 
 /* The sites from `first` on; *xyz is theirs until the next call. */
@@ -261,7 +261,7 @@ static ovoid_status measure_leaves(ovoid_context *context, measuring *m, bool co
                                    float *squared) {
     ovoid_status status = OVOID_OK;
     const size_t count = m->sites->count, batch = m->facets->batch;
-    OV_TRY(load_leaves(context, m->facets, coarse, m->first, m->end, m->box));
+    OV_TRY(load_leaves(context, m->facets, coarse, m->first, m->end, m->use_bound ? m->box : NULL));
     for (size_t k = 0, size; k < count; k += size) {
         const float *xyz;
         OV_TRY(ov_watch_ask(context, m->facets->watch, "measuring distances"));

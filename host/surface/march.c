@@ -86,12 +86,6 @@ static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
     return OVOID_OK;
 }
 
-static ovoid_status upload(ovoid_context *context, ov_buffer *buffer, const void *data,
-                           size_t bytes, const char *what) {
-    const ovoid_status status = ov_buffer_reserve(context, buffer, bytes, what);
-    return status == OVOID_OK ? ov_buffer_write(context, buffer, 0, data, bytes) : status;
-}
-
 static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     const ov_brick_grid *const grid = &m->grid;
@@ -99,11 +93,13 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     const size_t moved = faces > grid->ghosts ? faces : grid->ghosts;
     ov_case_table cases;
     ov_case_table_make(&cases);
-    OV_TRY(upload(context, &m->cases, &cases, sizeof cases, "cases of marching cubes"));
-    OV_TRY(upload(context, &m->face_list, grid->face, faces * sizeof(cl_uint), "lattice bricks"));
-    OV_TRY(upload(context, &m->ghost_list, grid->ghost, grid->ghosts * sizeof(cl_uint),
-                  "lattice bricks"));
-    OV_TRY(upload(context, &m->place, grid->place, padded * sizeof(cl_uint), "lattice bricks"));
+    OV_TRY(ov_buffer_put(context, &m->cases, &cases, sizeof cases, "cases of marching cubes"));
+    OV_TRY(ov_buffer_put(context, &m->face_list, grid->face, faces * sizeof(cl_uint),
+                         "lattice bricks"));
+    OV_TRY(ov_buffer_put(context, &m->ghost_list, grid->ghost, grid->ghosts * sizeof(cl_uint),
+                         "lattice bricks"));
+    OV_TRY(
+        ov_buffer_put(context, &m->place, grid->place, padded * sizeof(cl_uint), "lattice bricks"));
     OV_TRY(
         ov_buffer_reserve(context, &m->value, padded * OV_PACK * sizeof(float), "lattice values"));
     OV_TRY(ov_buffer_reserve(context, &m->sign, padded * sizeof(cl_uint), "signs of bricks"));
@@ -406,7 +402,7 @@ static ovoid_status list_terms(ovoid_context *context, marcher *m, size_t packs)
                    "boxes of vertices"));
     box_packs(m, packs);
     OV_TRY(ov_tree_build(context, m->boxes, packs, &points.tree, &tree, &floats));
-    OV_TRY(upload(context, &points.boxes, tree, floats * sizeof *tree, "boxes of vertices"));
+    OV_TRY(ov_buffer_put(context, &points.boxes, tree, floats * sizeof *tree, "boxes of vertices"));
     OV_TRY(ov_lists_build(context, &m->lists, &points, &m->terms, 0.0));
 cleanup:
     free(tree);
@@ -505,8 +501,8 @@ static ovoid_status take_piece(ovoid_context *context, marcher *m) {
     const size_t packs = (m->new_vertices + OV_PACK - 1) / OV_PACK;
     if (m->active_count == 0)
         return OVOID_OK;
-    OV_TRY(upload(context, &m->list, m->active, m->active_count * 4 * sizeof *m->active,
-                  "bricks at the surface"));
+    OV_TRY(ov_buffer_put(context, &m->list, m->active, m->active_count * 4 * sizeof *m->active,
+                         "bricks at the surface"));
     OV_TRY(ov_buffer_write(context, &m->crossing, 0, m->host_crossing,
                            m->grid.padded_total * CROSSING * sizeof *m->host_crossing));
     OV_TRY(take_triangles(context, m));

@@ -124,10 +124,8 @@ static ovoid_status make_cells(ovoid_context *context, const ov_rays *rays, ov_b
     }
     boxes->cells.count = boxes->cells.packs = count;
     OV_TRY(ov_tree_build(context, leaves, count, &boxes->cells.tree, &tree, &floats));
-    OV_TRY(ov_buffer_reserve(context, &boxes->cells.boxes, floats * sizeof *tree, "boxes"));
-    OV_TRY(ov_buffer_write(context, &boxes->cells.boxes, 0, tree, floats * sizeof *tree));
-    OV_TRY(ov_buffer_reserve(context, &boxes->box_of, count * sizeof *box_of, "boxes of rays"));
-    OV_TRY(ov_buffer_write(context, &boxes->box_of, 0, box_of, count * sizeof *box_of));
+    OV_TRY(ov_buffer_put(context, &boxes->cells.boxes, tree, floats * sizeof *tree, "boxes"));
+    OV_TRY(ov_buffer_put(context, &boxes->box_of, box_of, count * sizeof *box_of, "boxes of rays"));
 cleanup:
     free(order);
     free(box_of);

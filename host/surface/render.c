@@ -302,15 +302,6 @@ cleanup:
 /* How a pixel gets its colour. */
 typedef enum paint { PAINT_PLAIN = 0, PAINT_DISTANCE, PAINT_INDEX } paint;
 
-static ovoid_status upload(ovoid_context *context, ov_buffer *buffer, const void *data,
-                           size_t bytes, const char *what) {
-    ovoid_status status = OVOID_OK;
-    OV_TRY(ov_buffer_reserve(context, buffer, bytes, what));
-    OV_TRY(ov_buffer_write(context, buffer, 0, data, bytes));
-cleanup:
-    return status;
-}
-
 /* A spiral that is denser in the middle, so that both narrow clefts and wide pockets are met. */
 static ovoid_status upload_taps(painter *p) {
     float taps[2 * TAPS];
@@ -319,7 +310,7 @@ static ovoid_status upload_taps(painter *p) {
         taps[2 * k] = (float)(radius * cos(angle));
         taps[2 * k + 1] = (float)(radius * sin(angle));
     }
-    return upload(p->context, &p->taps, taps, sizeof taps, "light");
+    return ov_buffer_put(p->context, &p->taps, taps, sizeof taps, "light");
 }
 
 static cl_float4 to_float4(const float from[4]) {
@@ -387,7 +378,7 @@ static ovoid_status shade(painter *p, const scene *base, paint by, const scene *
         OV_TRY(ov_buffer_reserve(p->context, &p->pixels, 4 * count, "the pixels of an image"));
         OV_TRY(ov_buffer_reserve(p->context, &p->cover, count, "the pixels of an image"));
     }
-    OV_TRY(upload(p->context, &p->palette, palette, sizeof p->diverging, "colours"));
+    OV_TRY(ov_buffer_put(p->context, &p->palette, palette, sizeof p->diverging, "colours"));
     OV_TRY(launch_shade(p, base, by, pane, colour));
     OV_TRY(ov_buffer_read(p->context, &p->pixels, 0, image->pixels, 4 * count));
     OV_TRY(count_covered(p, image));

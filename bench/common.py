@@ -44,12 +44,13 @@ def find(folder, name):
     return None
 
 
-def report_of(ovoid, arguments, codes=(0,)):
-    """Runs the tool, which must exit with one of the codes, and returns its report."""
+def report_of(ovoid, arguments, codes=(0,), seconds=None):
+    """Runs the tool, which must exit with one of the codes, in so many seconds at most if it is
+    said, and returns its report."""
     with tempfile.TemporaryDirectory() as folder:
         report = os.path.join(folder, "report.json")
         command = [ovoid] + arguments + ["--quiet", "--report", report]
-        code = subprocess.run(command, check=False).returncode
+        code = subprocess.run(command, check=False, timeout=seconds).returncode
         if code not in codes:
             raise subprocess.CalledProcessError(code, command)
         with open(report, encoding="utf-8") as text:

@@ -73,8 +73,9 @@ static void lists_follow_moving_ellipsoids(void **state) {
         double *const xyz = make_samples(*state, &random, count, half, 1.0, &samples, &targets);
         double *const x = test_alloc(terms * SIZE, sizeof *x);
         ov_quadric *const quadrics = test_alloc(terms, sizeof *quadrics);
-        test_check(*state, ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID, terms,
-                                                  &objective));
+        const double limit = how % 2 ? 0.6 : INFINITY; /* of targets up to 1 */
+        test_check(*state, ov_l1_objective_create(*state, &samples, limit, OVOID_KERNEL_ELLIPSOID,
+                                                  terms, &objective));
         for (size_t i = 0; i < terms; ++i) {
             double *const p = x + i * SIZE;
             p[OV_L1_C] = random_uniform(&random, 1.0, 2.0);
@@ -106,7 +107,7 @@ static void lists_follow_moving_ellipsoids(void **state) {
                              step, value[k], wanted.value);
                 assert_true(value[k] <= wanted.value + rounding);
                 most = fmax(most, wanted.value - value[k]);
-                const double error = value[k] - targets[k];
+                const double error = reference_residual(value[k], targets[k], limit);
                 accuracy += error * error;
                 largest = fmax(largest, fabs(error));
             }
@@ -138,13 +139,13 @@ static void lists_follow_pruning(void **state) {
     ov_l1_evaluation result;
     double *targets, x[TERMS * SIZE];
     double *const xyz = make_samples(*state, &random, COUNT, half, 1.0, &samples, &targets);
-    test_check(*state,
-               ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID, TERMS, &objective));
+    test_check(*state, ov_l1_objective_create(*state, &samples, INFINITY, OVOID_KERNEL_ELLIPSOID,
+                                              TERMS, &objective));
     for (size_t i = 0; i < TERMS * SIZE; ++i)
         x[i] = random_uniform(&random, 0.5, 1.5);
     for (size_t count = TERMS; count > 0; --count) {
         test_check(*state, ov_l1_evaluate(&objective, x, count, &result));
-        const double wanted = reference_accuracy(x, count, xyz, targets, COUNT);
+        const double wanted = reference_accuracy(x, count, xyz, targets, COUNT, INFINITY);
         expect_near(result.accuracy, wanted, 1e-4 * wanted, "E_s");
         if (count % 2 == 0) /* the first one goes, else the last */
             memmove(x, x + SIZE, (count - 1) * SIZE * sizeof *x);
@@ -158,8 +159,8 @@ static void lists_follow_pruning(void **state) {
 /* ---- gradient ----------------------------------------------------------------------------- */
 
 static double objective_of(const double *x, size_t terms, const double *xyz, const double *targets,
-                           size_t count, ov_l1_weights w) {
-    return w.accuracy * reference_accuracy(x, terms, xyz, targets, count) +
+                           size_t count, double limit, ov_l1_weights w) {
+    return w.accuracy * reference_accuracy(x, terms, xyz, targets, count, limit) +
            w.sparse * reference_sparsity(x, terms);
 }
 
@@ -189,17 +190,36 @@ static void shape_parameters(test_random *random, shape kind, double *x, size_t 
     }
 }
 
+/* Where a limit holds the inside, some targets above it are met and ask for nothing, others pull.
+ */
+static void expect_held(const ov_l1_objective *objective, const double *targets, size_t count,
+                        double limit) {
+    size_t met = 0, pulling = 0;
+    float *const u = read_floats(objective->context, &objective->residual, count);
+    for (size_t k = 0; k < count; ++k)
+        if (targets[k] > limit) {
+            assert_true(u[k] <= 0.0f);
+            met += u[k] == 0.0f;
+            pulling += u[k] < 0.0f;
+        }
+    free(u);
+    if (isfinite(limit) && !test_small())
+        assert_true(met > 0 && pulling > 0);
+}
+
 /* The whole objective, E_l1 with its signs, by every one of the ten parameters, against central
  * differences in double. Single precision and the cut-off leave 1e-4 of the largest component. */
 static void gradient_equals_central_differences(void **state) {
     const double half[3] = {3.0, 3.0, 3.0};
     const ov_l1_weights weights[] = {{0.05, 0.95}, {1.0, 0.0}, {0.0, 1.0}};
+    const double limits[] = {1.2, INFINITY, 1.2};
     enum { TERMS = 3 };
     const size_t count = test_size(400, 40);
     for (int kind = 0; kind < SHAPES; ++kind)
         for (size_t n = 0; n < test_size(3, 1); ++n) {
             test_random random = {30 + (uint64_t)kind};
             const ov_l1_weights w = weights[n];
+            const double limit = limits[n]; /* of targets up to 2 */
             ov_samples samples;
             ov_l1_objective objective;
             ov_l1_evaluation result;
@@ -207,16 +227,17 @@ static void gradient_equals_central_differences(void **state) {
             double *const xyz = make_samples(*state, &random, count, half, 2.0, &samples, &targets);
             double largest = 0.0;
             shape_parameters(&random, (shape)kind, x, TERMS);
-            test_check(*state, ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID,
-                                                      TERMS, &objective));
+            test_check(*state, ov_l1_objective_create(*state, &samples, limit,
+                                                      OVOID_KERNEL_ELLIPSOID, TERMS, &objective));
             test_check(*state, ov_l1_evaluate(&objective, x, TERMS, &result));
+            expect_held(&objective, targets, count, limit);
             test_check(*state, ov_l1_gradient(&objective, x, TERMS, w, gradient));
             for (size_t j = 0; j < TERMS * SIZE; ++j) {
                 const double h = 1e-4, middle = x[j];
                 x[j] = middle + h;
-                const double up = objective_of(x, TERMS, xyz, targets, count, w);
+                const double up = objective_of(x, TERMS, xyz, targets, count, limit, w);
                 x[j] = middle - h;
-                const double down = objective_of(x, TERMS, xyz, targets, count, w);
+                const double down = objective_of(x, TERMS, xyz, targets, count, limit, w);
                 x[j] = middle;
                 slope[j] = (up - down) / (2.0 * h);
                 largest = fmax(largest, fabs(slope[j]));
@@ -248,8 +269,8 @@ static void gradient_at_zero(void **state) {
     shape_parameters(&random, RANDOM, x, 2);
     x[OV_L1_C] = 0.0;
     x[SIZE + OV_L1_D] = 0.0;
-    test_check(*state,
-               ov_l1_objective_create(*state, &samples, OVOID_KERNEL_ELLIPSOID, 2, &objective));
+    test_check(*state, ov_l1_objective_create(*state, &samples, INFINITY, OVOID_KERNEL_ELLIPSOID, 2,
+                                              &objective));
     test_check(*state, ov_l1_evaluate(&objective, x, 2, &result));
     test_check(*state, ov_l1_gradient(&objective, x, 2, w, gradient));
     assert_true(gradient[OV_L1_C] == 0.0);

@@ -48,6 +48,10 @@ const cli_number fit_l1_numbers[] = {
     COUNT("iterations", l1.iterations, 1, UINT32_MAX, "iterations at most: MaxNiter"),
     COUNT("sparse-iterations", l1.sparse_iterations, 0, UINT32_MAX,
           "of these, iterations that also make the model sparse: SparseNiter"),
+    COUNT(
+        "inside-every", l1.inside_every, 0, UINT32_MAX,
+        "where the field is above c + 1, every so many-th point along each axis holds the inside: "
+        "the model's field is not to fall below c + 1; 0: none, the paper's text taken literally"),
     REAL("epsilon", l1.epsilon, 0, true, 1, false, "",
          "smallest weight of the accuracy term in step 5.4"),
     REAL("max-error", l1.max_error, 0, true, INFINITY, true, "",

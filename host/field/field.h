@@ -139,10 +139,11 @@ ovoid_status ov_gram(ovoid_context *context, ov_operations *operations, const ov
                      const ov_terms *terms, const ov_lists *lists, const ov_buffer *w,
                      ov_buffer *result);
 
-/* u = value - target at the points, 0 at the fill; sums: per pack sum of u^2 and largest |u|. */
+/* u = value - target at the points, 0 at the fill; where target > limit, u = min(value - limit, 0)
+ * (INFINITY: nowhere). sums: per pack sum of u^2 and largest |u|. */
 ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, const ov_points *points,
-                         const ov_buffer *value, const ov_buffer *target, ov_buffer *u,
-                         ov_buffer *sums);
+                         const ov_buffer *value, const ov_buffer *target, double limit,
+                         ov_buffer *u, ov_buffer *sums);
 
 /* ---- constrained points ------------------------------------------------------------------- */
 

@@ -1,5 +1,7 @@
 #include "field/field.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 static ovoid_status make(ovoid_context *context, ov_kernel *kernel, const char *program,
@@ -140,18 +142,19 @@ cleanup:
 }
 
 ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, const ov_points *points,
-                         const ov_buffer *value, const ov_buffer *target, ov_buffer *u,
-                         ov_buffer *sums) {
+                         const ov_buffer *value, const ov_buffer *target, double limit,
+                         ov_buffer *u, ov_buffer *sums) {
     ovoid_status status = OVOID_OK;
     const cl_uint packs = (cl_uint)points->packs, count = (cl_uint)points->count;
+    const cl_float single_limit = (cl_float)fmin(limit, FLT_MAX);
     ov_device *device;
     OV_TRY(ov_device_get(context, &device));
     OV_TRY(make(context, &operations->residual, "residual", "residual"));
     OV_TRY(reserve_values(context, points, u));
     OV_TRY(ov_buffer_reserve(context, sums, points->packs * 2 * sizeof(cl_float), "pack sums"));
     OV_TRY(OV_LAUNCH(context, &operations->residual, points->packs, ov_item_group(device),
-                     OV_ARG(packs), OV_ARG(count), OV_ARG(value->memory), OV_ARG(target->memory),
-                     OV_ARG(u->memory), OV_ARG(sums->memory)));
+                     OV_ARG(packs), OV_ARG(count), OV_ARG(single_limit), OV_ARG(value->memory),
+                     OV_ARG(target->memory), OV_ARG(u->memory), OV_ARG(sums->memory)));
 cleanup:
     return status;
 }

@@ -41,6 +41,7 @@ typedef struct sampler {
     size_t quadrics_capacity;
     float *kept;                      /* x, y, z relative to origin */
     size_t kept_count, kept_capacity; /* capacity in floats */
+    size_t band_count;                /* of the kept points, those within [low, high] */
     uint64_t kept_limit;
 } sampler;
 
@@ -259,6 +260,7 @@ static void keep_point(sampler *s, const uint64_t first[3], uint64_t j, float va
         s->kept[3 * s->kept_count + axis] =
             (float)(coordinate(s->lattice, axis, index[axis]) - s->origin[axis]);
     ++s->kept_count;
+    s->band_count += value >= s->band.low && value <= s->band.high;
 }
 
 /* Appends the piece's points that lie on the lattice and are kept. */
@@ -302,7 +304,7 @@ static ovoid_status sample_pieces(ovoid_context *context, sampler *s) {
                 OV_TRY(keep_band(context, s, at));
                 OV_TRY(ask_to_go_on(context, s));
             }
-    if (s->kept_count == 0)
+    if (s->band_count == 0) /* guards alone say nothing about the surface */
         status = ov_fail(context, OVOID_ERROR_EMPTY,
                          "no lattice point has a field between %g and %g; use a smaller spacing or "
                          "a larger padding",

@@ -22,13 +22,15 @@ static bool report_sampling(uint64_t points, void *user) {
     return !options->progress || options->progress(&progress, options->user);
 }
 
-/* Section 3.2.1 of the paper: |phi - c| <= 1. */
+/* Section 3.2.2 of the paper: |phi - c| <= 1; and what holds the inside, beyond the paper. */
 static ovoid_status sample_band(ovoid_context *context, const ovoid_molecule *molecule,
                                 const ovoid_fit_options *options, double began,
                                 ov_samples *samples) {
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const size_t atoms = ovoid_molecule_atoms(molecule);
-    const ov_band band = {.low = options->isovalue - 1.0, .high = options->isovalue + 1.0};
+    const ov_band band = {.low = options->isovalue - 1.0,
+                          .high = options->isovalue + 1.0,
+                          .inside_every = options->l1.inside_every};
     sampling_report report = {.options = options, .atoms = atoms, .began = began};
     const ov_sampling sampling = {.go_on = report_sampling, .user = &report};
     ov_lattice lattice;

@@ -205,12 +205,14 @@ static void initialise(fit *f, const double *xyzr) {
 }
 
 static ovoid_status allocate(fit *f, ovoid_context *context, const ov_samples *samples) {
+    const double limit = f->options->l1.inside_every ? f->options->isovalue + 1.0 : INFINITY;
     double **const vectors[] = {&f->x, &f->trial, &f->gradient, &f->gradient_before};
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; ++k)
         if (!(*vectors[k] =
                   ov_alloc(context, f->count * OV_L1_PARAMETERS, sizeof(double), "parameters")))
             return OVOID_ERROR_MEMORY;
-    return ov_l1_objective_create(context, samples, f->options->l1.kernel, f->count, &f->objective);
+    return ov_l1_objective_create(context, samples, limit, f->options->l1.kernel, f->count,
+                                  &f->objective);
 }
 
 static void destroy(fit *f) {

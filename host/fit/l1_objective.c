@@ -92,7 +92,8 @@ ovoid_status ov_l1_evaluate(ov_l1_objective *objective, const double *x, size_t 
     OV_TRY(ov_field(objective->context, &objective->operations, points, &objective->terms,
                     &objective->lists, &objective->value));
     OV_TRY(ov_residual(objective->context, &objective->operations, points, &objective->value,
-                       &objective->samples->value, &objective->residual, &objective->pack_sums));
+                       &objective->samples->value, objective->limit, &objective->residual,
+                       &objective->pack_sums));
     OV_TRY(ov_buffer_read(objective->context, &objective->pack_sums, 0, objective->sums,
                           points->packs * 2 * sizeof *objective->sums));
     *result = (ov_l1_evaluation){0};
@@ -155,11 +156,14 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *samples,
+ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *samples, double limit,
                                     ovoid_kernel kernel, size_t ellipsoids,
                                     ov_l1_objective *objective) {
-    ov_l1_objective made = {
-        .context = context, .samples = samples, .kernel = kernel, .skin = SKIN_FIRST};
+    ov_l1_objective made = {.context = context,
+                            .samples = samples,
+                            .limit = limit,
+                            .kernel = kernel,
+                            .skin = SKIN_FIRST};
     made.listed =
         ov_alloc(context, ellipsoids * OV_L1_PARAMETERS, sizeof *made.listed, "parameters");
     made.quadrics = ov_alloc(context, ellipsoids, sizeof *made.quadrics, "ellipsoids");

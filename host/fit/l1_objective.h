@@ -10,8 +10,8 @@
 
 /* What an evaluation of the model at the points gives. */
 typedef struct ov_l1_evaluation {
-    double accuracy;  /* E_s */
-    double max_error; /* max_k |phi~ - phi| */
+    double accuracy;  /* E_s, the sum of squared residuals */
+    double max_error; /* the largest residual: max_k |phi~ - phi|, inside how far phi~ fell */
 } ov_l1_evaluation;
 
 typedef struct ov_l1_weights {
@@ -21,6 +21,7 @@ typedef struct ov_l1_weights {
 typedef struct ov_l1_objective {
     ovoid_context *context;
     const ov_samples *samples;
+    double limit; /* targets above it hold the inside: see ov_residual() */
     ovoid_kernel kernel;
     double *listed; /* parameters that the lists were built for, listed_count ellipsoids */
     size_t listed_count;
@@ -36,8 +37,9 @@ typedef struct ov_l1_objective {
     ovoid_fit_profile profile;
 } ov_l1_objective;
 
-/* Room for up to `ellipsoids` of them. samples must outlive the objective. */
-ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *samples,
+/* Room for up to `ellipsoids` of them. Samples with phi > limit only ask that phi~ does not fall
+ * below limit (INFINITY: all ask for phi~ = phi). samples must outlive the objective. */
+ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *samples, double limit,
                                     ovoid_kernel kernel, size_t ellipsoids,
                                     ov_l1_objective *objective);
 void ov_l1_objective_destroy(ov_l1_objective *objective);

@@ -26,6 +26,7 @@ void ovoid_fit_options_init(ovoid_fit_options *options) {
                 .kernel = OVOID_KERNEL_ELLIPSOID,
                 .iterations = 8000,
                 .sparse_iterations = 6000,
+                .inside_every = 1,
                 .epsilon = 0.05,
                 .max_error = 0.5,
                 .prune_below = 1e-3,

@@ -330,6 +330,11 @@ typedef struct ovoid_l1_options {
     ovoid_kernel kernel;         /* ELLIPSOID */
     uint32_t iterations;         /* MaxNiter: 8000 (section 4.1, ADP) */
     uint32_t sparse_iterations;  /* SparseNiter: 6000 (section 4.1, ADP) */
+    uint32_t inside_every;       /* beyond the paper: of the lattice points with phi > c + 1, those
+                                    whose three indices are multiples of this hold the inside, where
+                                    phi~ is not to fall below c + 1: their residual is
+                                    min(phi~ - (c + 1), 0). 0: none, the paper's text taken
+                                    literally */
     double epsilon;              /* lower bound of w_s in step 5.4 (open) */
     double max_error;            /* gate of step 5.5: 0.5 */
     double prune_below;          /* tol of step 5.1: |c~| under it is deleted: 1e-3 */

@@ -245,8 +245,14 @@ double reference_phi(const double *xyzr, size_t atoms, double decay, const doubl
     return sum;
 }
 
+double reference_residual(double value, double target, double limit) {
+    if (target > limit)
+        return value < limit ? value - limit : 0.0;
+    return value - target;
+}
+
 double reference_accuracy(const double *parameters, size_t ellipsoids, const double *xyz,
-                          const double *target, size_t points) {
+                          const double *target, size_t points, double limit) {
     double sum = 0.0;
     for (size_t k = 0; k < points; ++k) {
         double field = 0.0;
@@ -260,7 +266,8 @@ double reference_accuracy(const double *parameters, size_t ellipsoids, const dou
             };
             field += reference_ellipsoid(&ellipsoid, xyz + 3 * k);
         }
-        sum += (field - target[k]) * (field - target[k]);
+        const double residual = reference_residual(field, target[k], limit);
+        sum += residual * residual;
     }
     return sum;
 }

@@ -54,7 +54,10 @@ double reference_phi(const double *xyzr, size_t atoms, double decay, const doubl
 /* sum_k (phi~(y_k) - target_k)^2 for the paper's parameters, ten per ellipsoid in the order of
  * fit/chain.h. */
 double reference_accuracy(const double *parameters, size_t ellipsoids, const double *xyz,
-                          const double *target, size_t points);
+                          const double *target, size_t points, double limit);
+
+/* What the model's value leaves of a target; one above limit only asks for a value of limit. */
+double reference_residual(double value, double target, double limit);
 
 /* sum |c| + |d_1| + |d_2| + |d_3|. */
 double reference_sparsity(const double *parameters, size_t ellipsoids);

@@ -126,7 +126,8 @@ void cli_remove_when_killed(const char *path);
 /* ---- progress.c ----------------------------------------------------------------------------- */
 
 /* Shows the state of a fit in one line of standard error if that is a terminal. `label` begins the
- * line and must outlive it; NULL for none. */
+ * line and must outlive it; NULL for none. The first state after a start and the first of each
+ * stage are drawn at once, those between at most every tenth of a second of cli_seconds(). */
 void cli_progress_start(bool quiet, const char *label);
 void cli_progress_show(const ovoid_progress *progress);
 void cli_progress_erase(void);

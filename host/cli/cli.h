@@ -113,6 +113,11 @@ const char *cli_nearest(const char *text, const char *const *names);
  * size limit become write errors. */
 void cli_catch_signals(void);
 
+/* The same again: the compiler of a driver (LLVM in PoCL) puts handlers of its own in their place,
+ * also of ignored signals, and where those are called a write that waits fails. To be called after
+ * kernels may have been compiled. */
+void cli_keep_signals(void);
+
 /* From now on, with work under way that has to be stopped in order, the first signal only raises a
  * flag, and a second one kills. */
 void cli_defer_signals(void);

@@ -113,6 +113,11 @@ const char *cli_nearest(const char *text, const char *const *names);
  * size limit become write errors. */
 void cli_catch_signals(void);
 
+/* The same again: the compiler of a driver (LLVM in PoCL) puts handlers of its own in their place,
+ * also of ignored signals, and where those are called a write that waits fails. To be called after
+ * kernels may have been compiled. */
+void cli_keep_signals(void);
+
 /* From now on, with work under way that has to be stopped in order, the first signal only raises a
  * flag, and a second one kills. */
 void cli_defer_signals(void);
@@ -126,7 +131,8 @@ void cli_remove_when_killed(const char *path);
 /* ---- progress.c ----------------------------------------------------------------------------- */
 
 /* Shows the state of a fit in one line of standard error if that is a terminal. `label` begins the
- * line and must outlive it; NULL for none. */
+ * line and must outlive it; NULL for none. The first state after a start and the first of each
+ * stage are drawn at once, those between at most every tenth of a second of cli_seconds(). */
 void cli_progress_start(bool quiet, const char *label);
 void cli_progress_show(const ovoid_progress *progress);
 void cli_progress_erase(void);

@@ -6,6 +6,7 @@
 
 static bool on_progress(const ovoid_progress *progress, void *user) {
     fit_job *job = user;
+    cli_keep_signals();
     fit_trace_add(&job->tracer, progress);
     cli_progress_show(progress);
     return cli_interrupted() == 0;
@@ -267,6 +268,7 @@ static ovoid_status write_models(fit_job *job) {
  * model is worth more than the others: their failure does not undo it. */
 static int write_outputs(fit_job *job) {
     double begin = cli_seconds();
+    cli_keep_signals();
     ovoid_status status = write_models(job);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);

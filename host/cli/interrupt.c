@@ -1,9 +1,11 @@
 #include "cli.h"
 
 #include <signal.h>
+#include <stdatomic.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t caught, deferred;
+static volatile sig_atomic_t deferred;
+static atomic_int caught;           /* two signals may come at once, in threads of the driver */
 static const char *volatile doomed; /* file to remove when killed */
 
 static void on_signal(int number) {
@@ -12,26 +14,34 @@ static void on_signal(int number) {
         (void)!write(STDERR_FILENO, text, sizeof text - 1);
         _exit(128 + number);
     }
-    if (!caught) {
-        caught = number;
+    int none = 0;
+    if (atomic_compare_exchange_strong(&caught, &none, number))
         return;
-    }
     if (doomed)
         unlink(doomed);
     signal(number, SIG_DFL);
     raise(number); /* takes effect when this handler returns */
 }
 
-void cli_catch_signals(void) {
-    static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
-    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
-        struct sigaction action;
-        if (sigaction(numbers[i], NULL, &action) != 0 || action.sa_handler == SIG_IGN)
-            continue;
-        action = (struct sigaction){.sa_handler = on_signal, .sa_flags = SA_RESTART};
+enum { SIGNALS = 3 };
+static const int numbers[SIGNALS] = {SIGINT, SIGTERM, SIGHUP};
+static bool ignored[SIGNALS]; /* by the caller */
+
+void cli_keep_signals(void) {
+    for (int i = 0; i < SIGNALS; i++) {
+        struct sigaction action = {.sa_handler = ignored[i] ? SIG_IGN : on_signal,
+                                   .sa_flags = SA_RESTART};
         sigemptyset(&action.sa_mask);
         sigaction(numbers[i], &action, NULL);
     }
+}
+
+void cli_catch_signals(void) {
+    for (int i = 0; i < SIGNALS; i++) {
+        struct sigaction action;
+        ignored[i] = sigaction(numbers[i], NULL, &action) == 0 && action.sa_handler == SIG_IGN;
+    }
+    cli_keep_signals();
     signal(SIGPIPE, SIG_IGN);
 #ifdef SIGXFSZ
     signal(SIGXFSZ, SIG_IGN);

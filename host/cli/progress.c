@@ -7,14 +7,16 @@
 #include <unistd.h>
 
 enum { WIDTH_UNKNOWN = 80, WIDTH_MOST = 100, BAR = 20 };
+enum { STAGE_LENGTH = 32 };
 static const double redraw_seconds = 0.1;
 
 static struct {
     bool enabled;
-    bool shown;        /* the line is on the screen */
-    double drawn;      /* when, in cli_seconds() */
-    double pace;       /* smoothed seconds per iteration, 0 before it is known */
-    double at_seconds; /* where the pace was last measured */
+    bool shown;               /* the line is on the screen */
+    char stage[STAGE_LENGTH]; /* the stage that the line names */
+    double drawn;             /* when, in cli_seconds() */
+    double pace;              /* smoothed seconds per iteration, 0 before it is known */
+    double at_seconds;        /* where the pace was last measured */
     uint64_t at_iteration;
     const char *label;
 } line;
@@ -43,14 +45,16 @@ static size_t terminal_width(void) {
     return width < WIDTH_MOST ? width : WIDTH_MOST;
 }
 
-/* Follows the time of an iteration, which falls as ellipsoids go. */
-static void measure_pace(const ovoid_progress *progress) {
-    uint64_t done = progress->iteration - line.at_iteration;
-    double spent = progress->seconds - line.at_seconds;
-    if (done == 0 || spent <= 0.0)
-        return;
-    double now = spent / (double)done;
-    line.pace = line.pace > 0.0 ? 0.8 * line.pace + 0.2 * now : now;
+/* Follows the time of an iteration, which falls as ellipsoids go. The first iteration of a stage
+ * also holds what prepares it: measuring begins after it. */
+static void measure_pace(const ovoid_progress *progress, bool new_stage) {
+    if (!new_stage) {
+        const double spent = progress->seconds - line.at_seconds;
+        if (progress->iteration <= line.at_iteration || spent <= 0.0)
+            return;
+        const double now = spent / (double)(progress->iteration - line.at_iteration);
+        line.pace = line.pace > 0.0 ? 0.8 * line.pace + 0.2 * now : now;
+    }
     line.at_iteration = progress->iteration;
     line.at_seconds = progress->seconds;
 }
@@ -80,7 +84,8 @@ static void append_count(char *text, size_t width, uint64_t number, const char *
     append(text, width, part);
 }
 
-/* Nobody knows how many steps there will be: what is done, and for how long it has gone on. */
+/* Nobody knows how many steps there will be, or none has been done: what is done, and for how long
+ * it has gone on. */
 static void compose_endless(const ovoid_progress *progress, char *text, size_t width) {
     char part[96];
     if (progress->iteration > 0) {
@@ -99,8 +104,6 @@ static void compose_endless(const ovoid_progress *progress, char *text, size_t w
 static void compose_bounded(const ovoid_progress *progress, char *text, size_t width) {
     char part[96];
     double share = (double)progress->iteration / (double)progress->iterations;
-    if (progress->iteration == 0)
-        return;
     snprintf(part, sizeof part, "%llu/%llu", (unsigned long long)progress->iteration,
              (unsigned long long)progress->iterations);
     append(text, width, part);
@@ -126,22 +129,27 @@ static void compose(const ovoid_progress *progress, char *text, size_t width) {
     if (line.label)
         append(text, width, line.label);
     append(text, width, progress->stage);
-    if (progress->iterations == 0)
+    if (progress->iterations == 0 || progress->iteration == 0)
         compose_endless(progress, text, width);
     else
         compose_bounded(progress, text, width);
 }
 
+/* A new stage at once, however short the one before it was: what the screen names is what is under
+ * way. Within a stage as often as eyes can follow. */
 void cli_progress_show(const ovoid_progress *progress) {
-    double now = cli_seconds();
-    if (!line.enabled || (line.shown && now - line.drawn < redraw_seconds))
+    if (!line.enabled)
         return;
-    if (progress->iteration > line.at_iteration)
-        measure_pace(progress);
+    const double now = cli_seconds();
+    const bool new_stage = strncmp(line.stage, progress->stage, STAGE_LENGTH - 1) != 0;
+    if (line.shown && !new_stage && now - line.drawn < redraw_seconds)
+        return;
+    measure_pace(progress, new_stage);
     char text[WIDTH_MOST + 1];
     compose(progress, text, terminal_width() - 1); /* the last column would wrap */
     fprintf(stderr, "\r%s\033[K", text);
     fflush(stderr);
     line.shown = true;
     line.drawn = now;
+    snprintf(line.stage, sizeof line.stage, "%s", progress->stage);
 }

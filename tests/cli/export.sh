@@ -116,15 +116,9 @@ env --default-signal=INT true 2>/dev/null || skip "env cannot reset signals"
 last="ovoid export a.xyzr -o a.dx --spacing 0.01, then SIGINT"
 env --default-signal=INT "$OVOID" export a.xyzr -o a.dx --spacing 0.01 >"$out" 2>"$err" &
 pid=$!
-tries=0
-until [ -n "$(find . -name '.ovoid-*.tmp' -size +0)" ]; do
-    tries=$((tries + 1))
-    [ $tries -lt 600 ] && kill -0 $pid || fail "the export did not start"
-    sleep 0.05
-done
+await_writing
 kill -s INT $pid
-wait $pid
-code=$?
+finish
 expect_code 130
 expect_err "ovoid: error: interrupted"
 expect_files a.xyzr m.ovoid

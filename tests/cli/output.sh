@@ -44,12 +44,11 @@ expect_code 0
 head -n 1 real.ovoid | grep -q "ovoid model" || fail "the link's target should hold the model"
 rm -r ./*.ovoid sub
 
-# Refused before the work: with so many iterations the test would not end otherwise.
-many="--method l1 --iterations 4000000000"
+# Refused before the work, which would begin with a line of output.
 cannot() {
     text=$1
     shift
-    run timeout 30 "$OVOID" fit a.xyzr $many "$@"
+    run "$OVOID" fit a.xyzr $few "$@"
     expect_code 4
     expect_no_out
     expect_err "ovoid: error: cannot write"
@@ -89,15 +88,15 @@ if [ -w /dev/full ]; then
         expect_files a.xyzr a.ovoid
     done
 fi
-# A reader that goes away.
-{
-    "$OVOID" fit a.xyzr $few -o - 2>"$err"
-    echo $? >../code
-} | true
-code=$(cat ../code)
-# The pipe may still have taken the model if the reader was slow to leave.
-[ "$code" -eq 4 ] || [ "$code" -eq 0 ] || fail "a closed pipe should be an error of output"
-[ "$code" -eq 0 ] || expect_err "cannot write standard output: Broken pipe"
+# A reader that has gone away: the pipe's only end for reading is closed before.
+mkfifo ../pipe
+(
+    exec 8<>../pipe 9>../pipe 8<&-
+    exec "$OVOID" fit a.xyzr $few -o - 2>"$err" >&9
+)
+code=$?
+expect_code 4
+expect_err "cannot write standard output: Broken pipe"
 
 # Closed standard output.
 "$OVOID" fit a.xyzr $few -q -o - >&- 2>"$err"

@@ -10,7 +10,7 @@ adds_up() {
         $(column) == "-" { unknown = 1 }
         NR > 1 { sum += last }
         { last = $(column) }
-        END { exit !unknown && (NR < 4 || last <= 0 || sum - last > off || last - sum > off) }' ||
+        END { exit !unknown && (NR < 4 || last < 0 || sum - last > off || last - sum > off) }' ||
         fail "column $1 should add up"
 }
 # Its last rows are these, with the kernels before them.

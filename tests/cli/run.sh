@@ -9,7 +9,8 @@ place=$(mktemp -d "${TMPDIR:-/tmp}/ovoid-cli-XXXXXX") || exit 1
 out=$place/out
 err=$place/err
 mkdir "$place/work" && cd "$place/work" || exit 1
-trap 'chmod -R u+w "$place"; rm -rf "$place"' EXIT
+pid= # of a process in the background, see finish()
+trap '[ -z "$pid" ] || kill -s KILL $pid; chmod -R u+w "$place"; rm -rf "$place"' EXIT
 trap 'exit 1' INT TERM HUP
 
 fail() {
@@ -40,6 +41,21 @@ expect_files() {
     [ $# -gt 0 ] || wanted=
     found=$(ls -A | sort)
     [ "$found" = "$wanted" ] || fail "files '$wanted' were expected, but there are '$found'"
+}
+
+# Waits until process $pid has written to a file that still has another name.
+await_writing() {
+    until [ -n "$(find . -name '.ovoid-*.tmp' -size +0)" ]; do
+        kill -0 $pid 2>/dev/null || fail "the program ended before it wrote anything"
+        sleep 0.05
+    done
+}
+
+# Waits for the end of process $pid: leaves its exit code in $code.
+finish() {
+    wait $pid
+    code=$?
+    pid=
 }
 
 skip() {

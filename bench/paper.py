@@ -282,7 +282,10 @@ def main():
         if arguments.figures:
             import paper_figures
 
+            import paper_pictures
+
             paper_figures.draw(arguments.figures, rows, isovalues, files)
+            paper_pictures.draw(arguments.ovoid, arguments.figures, dict(molecules), files)
     return 0
 
 

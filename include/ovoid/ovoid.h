@@ -275,9 +275,9 @@ OVOID_API ovoid_status ovoid_model_field(ovoid_context *context, const ovoid_mod
 
 /* Of the constrained points, angstrom. */
 #define OVOID_DEFAULT_SPACING_ADAPTIVE                                                             \
-    0.7 /* less for molecules of less than 640 atoms, and times                                    \
-           sqrt(0.5 / decay) for decays above 0.5 */
-#define OVOID_DEFAULT_SPACING_L1 0.8
+    0.7                               /* less for molecules of less than 640 atoms, and times      \
+                                         sqrt(0.5 / decay) for decays above 0.5 */
+#define OVOID_DEFAULT_SPACING_L1 1.25 /* bench/l1_settings.py says why */
 
 typedef enum ovoid_method {
     OVOID_METHOD_ADAPTIVE = 0, /* merges the atoms' Gaussians, then fits what is left to the

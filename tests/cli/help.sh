@@ -13,7 +13,7 @@ for command in "fit --help" "fit -h" "help fit" "fit molecule.pqr --decay 1 --he
     expect_code 0
     expect_silent
     for text in "Usage: ovoid fit MOLECULE" "Exit codes:" "Examples:" "OVOID_DEVICE" "(default 0.5 Å⁻²)" \
-        "(default adaptive)" "(default 0.5 Å)" "(default 0.7 Å, of method l1 0.8 Å)" \
+        "(default adaptive)" "(default 0.5 Å)" "(default 0.7 Å, of method l1 1.25 Å)" \
         "  7    a fit did not reach its goal" "B of 20 Å²" "ovoid fit molecule.pqr  "; do
         expect_out "$text"
     done

@@ -24,13 +24,17 @@ static const cli_number numbers[] = {
 enum { NUMBER_COUNT = sizeof numbers / sizeof *numbers };
 
 /* Values of the long options; those of the numbers follow. */
-enum { OUTPUT = 256, AS, FORMAT, COLOUR, DEVICE, QUIET, HELP, NUMBERS };
+enum { OUTPUT = 256, AS, COLOUR, DEVICE, QUIET, HELP, NUMBERS };
 
 static const struct option named[] = {
-    {"output", required_argument, NULL, OUTPUT}, {"as", required_argument, NULL, AS},
-    {"format", required_argument, NULL, FORMAT}, {"colour", required_argument, NULL, COLOUR},
-    {"color", required_argument, NULL, COLOUR},  {"device", required_argument, NULL, DEVICE},
-    {"quiet", no_argument, NULL, QUIET},         {"help", no_argument, NULL, HELP},
+    {"output", required_argument, NULL, OUTPUT},
+    {"as", required_argument, NULL, AS},
+    READING_OPTIONS,
+    {"colour", required_argument, NULL, COLOUR},
+    {"color", required_argument, NULL, COLOUR},
+    {"device", required_argument, NULL, DEVICE},
+    {"quiet", no_argument, NULL, QUIET},
+    {"help", no_argument, NULL, HELP},
 };
 enum { NAMED_COUNT = sizeof named / sizeof *named };
 
@@ -39,7 +43,7 @@ typedef struct export_job {
     const char *output;
     const char *device; /* NULL: the default */
     bool quiet;
-    source_format format;
+    reading reading;
     export_numbers numbers;
     ovoid_context *context;
     source source;
@@ -51,8 +55,8 @@ void cli_export_help(FILE *stream) {
     fputs("Usage: ovoid export INPUT -o FILE [OPTION]...\n"
           "\n"
           "Writes a model for another program, or the field of a model or a molecule as a density\n"
-          "map. INPUT is a model as 'ovoid fit' writes it, or for maps also a molecule (PQR or\n"
-          "XYZR); - is standard input, and a model unless --format says otherwise.\n"
+          "map. INPUT is a model as 'ovoid fit' writes it, or for maps also a molecule (PDB,\n"
+          "mmCIF, PQR or XYZR); - is standard input, and a model unless --format says otherwise.\n"
           "\n"
           "The extension of FILE says what is written:\n"
           "  .bild .bld        ellipsoids for ChimeraX, in one object (as bild)\n"
@@ -66,10 +70,10 @@ void cli_export_help(FILE *stream) {
           "Files:\n"
           "  -o, --output FILE   where it goes, - for standard output\n"
           "  --as NAME           what to write when the extension does not say: bild, cxc, pymol,\n"
-          "                      gmm, json, ccp4 or dx\n"
-          "  --format NAME       of INPUT: pqr, xyzr or ovoid (default: by its extension, else by\n"
-          "                      its contents)\n"
-          "\n"
+          "                      gmm, json, ccp4 or dx\n",
+          stream);
+    reading_help(stream, true);
+    fputs("\n"
           "Running:\n"
           "  --device SELECTOR   the device that computes maps, see 'ovoid devices'\n"
           "  -q, --quiet         print errors only\n"
@@ -153,8 +157,6 @@ static bool parse_option(int option, export_job *job) {
         return true;
     case AS:
         return parse_as(optarg, &options->format);
-    case FORMAT:
-        return source_parse_format(optarg, &job->format);
     case COLOUR:
         return parse_colour(optarg, options->colour);
     case DEVICE:
@@ -177,6 +179,7 @@ static bool parse(int argc, char **argv, export_job *job, int *code) {
     cli_number_options(numbers, NUMBER_COUNT, NUMBERS, all + NAMED_COUNT);
     job->numbers.decay = OVOID_DEFAULT_DECAY;
     ovoid_export_options_init(&job->numbers.options);
+    reading_init(&job->reading, true);
     opterr = 0;
     *code = CLI_USAGE;
     while ((option = getopt_long(argc, argv, ":o:qh", all, NULL)) != -1) {
@@ -189,7 +192,8 @@ static bool parse(int argc, char **argv, export_job *job, int *code) {
             *code = cli_bad_option("export", option, argv, all);
             return false;
         }
-        if (!parse_option(option, job))
+        if (reading_has(option) ? !reading_parse(&job->reading, option, optarg)
+                                : !parse_option(option, job))
             return false;
     }
     return complete(argc, argv, job);
@@ -230,8 +234,10 @@ static int run(export_job *job) {
     ovoid_status status = ovoid_file_check(job->context, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
-    if ((status = source_read(job->context, job->input, job->format, &job->source)) != OVOID_OK)
+    if ((status = source_read(job->context, job->input, &job->reading, &job->source)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
+    if (job->source.model && !reading_check_model(&job->reading, job->input))
+        return CLI_USAGE;
     if (format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX)
         status = ovoid_context_open_device(job->context, job->device);
     if (status != OVOID_OK)

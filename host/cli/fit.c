@@ -147,8 +147,7 @@ static ovoid_status annotate_all(const fit_job *job, size_t level) {
 
 static ovoid_status read_molecule(fit_job *job) {
     double begin = cli_seconds();
-    ovoid_status status =
-        ovoid_molecule_read(job->context, job->input, job->format, &job->molecule);
+    ovoid_status status = reading_molecule(&job->reading, job->context, job->input, &job->molecule);
     job->read_seconds = cli_seconds() - begin;
     return status;
 }

@@ -39,7 +39,7 @@ typedef struct fit_job {
     const char *trace;    /* NULL: none */
     const char *device;   /* NULL: the default */
     bool quiet;
-    ovoid_molecule_format format;
+    reading reading;
     ovoid_fit_options options; /* with the method's spacing, never 0 */
     uint32_t level_count;      /* asked for */
     bool measure;              /* compare the surfaces at the end */

@@ -14,9 +14,6 @@ static void print_files(FILE *stream) {
                     stream);
     cli_option_help("--report FILE", "write numbers about the fit as JSON", stream);
     cli_option_help("--trace FILE", "write a line per iteration or step as CSV", stream);
-    cli_option_help(
-        "--format NAME",
-        "of the molecule: pqr or xyzr (default: by its extension, else by its contents)", stream);
     fputs("\nFiles appear whole at the end or not at all; those that exist are replaced.\n",
           stream);
 }
@@ -102,14 +99,16 @@ void cli_fit_help(FILE *stream) {
     ovoid_measure_options measuring;
     ovoid_fit_options_init(&defaults);
     ovoid_measure_options_init(&measuring);
-    fputs("Usage: ovoid fit MOLECULE [OPTION]...\n"
-          "\n"
-          "Fits a sparse model, a few rotated ellipsoid Gaussians, to the Gaussian surface of the\n"
-          "molecule in the file MOLECULE: PQR or XYZR, also compressed with gzip, or - for\n"
-          "standard input. Prints what was done and writes the model to a text file.\n"
-          "\n",
-          stream);
+    fputs(
+        "Usage: ovoid fit MOLECULE [OPTION]...\n"
+        "\n"
+        "Fits a sparse model, a few rotated ellipsoid Gaussians, to the Gaussian surface of the\n"
+        "molecule in the file MOLECULE: PDB, mmCIF, PQR or XYZR, also compressed with gzip, or -\n"
+        "for standard input. Prints what was done and writes the model to a text file.\n"
+        "\n",
+        stream);
     print_files(stream);
+    reading_help(stream, false);
     print_running(&defaults, stream);
     print_surface(&defaults, &measuring, stream);
     print_adaptive(&defaults, stream);
@@ -117,6 +116,7 @@ void cli_fit_help(FILE *stream) {
     fputs("\n"
           "Examples:\n"
           "  ovoid fit molecule.pqr                          to molecule.ovoid, within 0.5 Å\n"
+          "  ovoid fit 1abc.cif.gz --select A                chain A of a PDB entry\n"
           "  ovoid fit molecule.pqr --tolerance 0.2          closer, with more ellipsoids\n"
           "  ovoid fit molecule.pqr --ellipsoids 50          the best that 50 can do\n"
           "  ovoid fit molecule.pqr --ratio 0.1 --levels 4   10 % of the atoms, 5 %, 2.5 %, 1.2 %\n"

@@ -102,7 +102,6 @@ enum {
     REPORT,
     TRACE,
     QUIET,
-    FORMAT,
     KERNEL,
     FIRST_STEP,
     NO_MEASURE,
@@ -120,7 +119,7 @@ static const struct option named[] = {
     {"report", required_argument, NULL, REPORT},
     {"trace", required_argument, NULL, TRACE},
     {"quiet", no_argument, NULL, QUIET},
-    {"format", required_argument, NULL, FORMAT},
+    READING_OPTIONS,
     {"kernel", required_argument, NULL, KERNEL},
     {"first-step", required_argument, NULL, FIRST_STEP},
     {"no-measure", no_argument, NULL, NO_MEASURE},
@@ -420,8 +419,6 @@ static bool parse_named(parser *p, int option) {
     case QUIET:
         job->quiet = true;
         return true;
-    case FORMAT:
-        return source_parse_molecule(optarg, &job->format);
     case KERNEL:
         p->l1 = "kernel";
         return parse_kernel(optarg, &job->options.l1.kernel);
@@ -450,6 +447,7 @@ bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
     fill_long_options(all);
     ovoid_fit_options_init(&job->options);
     ovoid_measure_options_init(&job->measuring);
+    reading_init(&job->reading, false);
     job->measure = true;
     job->level_count = 1;
     opterr = 0;
@@ -464,7 +462,9 @@ bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
             *code = cli_bad_option("fit", option, argv, all);
             return false;
         }
-        good = option >= NUMBERS ? parse_number(&p, option, optarg) : parse_named(&p, option);
+        good = reading_has(option) ? reading_parse(&job->reading, option, optarg)
+               : option >= NUMBERS ? parse_number(&p, option, optarg)
+                                   : parse_named(&p, option);
     }
     return good && complete(argc, argv, &p);
 }

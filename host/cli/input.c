@@ -31,9 +31,11 @@ static bool begins_as_model(const char *path) {
 }
 
 bool cli_is_model(const char *path) {
+    static const char *const molecules[] = {".pqr", ".xyzr", ".pdb", ".ent", ".cif", ".mmcif"};
     if (strcmp(path, "-") == 0 || ends_in(path, ".ovoid"))
         return true;
-    if (ends_in(path, ".pqr") || ends_in(path, ".xyzr"))
-        return false;
+    for (size_t i = 0; i < sizeof molecules / sizeof *molecules; i++)
+        if (ends_in(path, molecules[i]))
+            return false;
     return begins_as_model(path);
 }

@@ -16,7 +16,7 @@ typedef struct measure_job {
     const char *report; /* NULL: none */
     const char *device; /* NULL: the default */
     bool quiet;
-    ovoid_molecule_format format;
+    reading reading;
     ovoid_measure_options options;
     measure_row *rows; /* owned; none: at the model's isovalue */
     size_t row_count;
@@ -46,19 +46,20 @@ void cli_measure_help(FILE *stream) {
     ovoid_measure_options_init(&defaults);
     fputs("Usage: ovoid measure MOLECULE MODEL [OPTION]...\n"
           "\n"
-          "Compares the surface of a molecule (PQR or XYZR, also compressed with gzip) with that\n"
-          "of a model that 'ovoid fit' made of it: areas, volumes, distances in both directions\n"
+          "Compares the surface of a molecule (PDB, mmCIF, PQR or XYZR, also compressed with\n"
+          "gzip) with that of a model that 'ovoid fit' made of it: areas, volumes, distances in "
+          "both directions\n"
           "from the points of one surface to the triangles of the other, and connected pieces.\n"
           "The outer surface is what is left without the walls of cavities.\n"
           "\n"
           "Files:\n"
           "  --report FILE       write the measures as JSON, - for standard output\n"
-          "  --format NAME       of the molecule: pqr or xyzr (default: by its extension, else by\n"
-          "                      its contents)\n"
           "\n"
           "One of the inputs can be - for standard input. Files appear whole at the end or not\n"
-          "at all; those that exist are replaced.\n"
-          "\n"
+          "at all; those that exist are replaced.\n",
+          stream);
+    reading_help(stream, false);
+    fputs("\n"
           "Running:\n" CLI_HELP_RUNNING "  --profile           " CLI_HELP_PROFILE "\n"
           "\n"
           "The surfaces:\n"
@@ -146,10 +147,10 @@ static bool complete(int argc, char **argv, measure_job *job) {
 }
 
 static bool parse(int argc, char **argv, measure_job *job, int *code) {
-    enum { REPORT = 256, DEVICE, FORMAT, VERTICES, ISOVALUE, SPACING, PROFILE, QUIET, HELP };
+    enum { REPORT = 256, DEVICE, VERTICES, ISOVALUE, SPACING, PROFILE, QUIET, HELP };
     static const struct option options[] = {{"report", required_argument, NULL, REPORT},
                                             {"device", required_argument, NULL, DEVICE},
-                                            {"format", required_argument, NULL, FORMAT},
+                                            READING_OPTIONS,
                                             {"vertices", required_argument, NULL, VERTICES},
                                             {"isovalue", required_argument, NULL, ISOVALUE},
                                             {"spacing", required_argument, NULL, SPACING},
@@ -160,18 +161,20 @@ static bool parse(int argc, char **argv, measure_job *job, int *code) {
     bool good = true;
     int option;
     ovoid_measure_options_init(&job->options);
+    reading_init(&job->reading, false);
     opterr = 0;
     *code = CLI_USAGE;
     while (good && (option = getopt_long(argc, argv, ":qh", options, NULL)) != -1) {
+        if (reading_has(option)) {
+            good = reading_parse(&job->reading, option, optarg);
+            continue;
+        }
         switch (option) {
         case REPORT:
             job->report = optarg;
             break;
         case DEVICE:
             job->device = optarg;
-            break;
-        case FORMAT:
-            good = source_parse_molecule(optarg, &job->format);
             break;
         case VERTICES:
             good = measures_parse_vertices(optarg, &job->options.vertices);
@@ -206,18 +209,17 @@ static bool parse(int argc, char **argv, measure_job *job, int *code) {
 
 static ovoid_status read_inputs(measure_job *job) {
     ovoid_status status =
-        ovoid_molecule_read(job->context, job->molecule_path, job->format, &job->molecule);
+        reading_molecule(&job->reading, job->context, job->molecule_path, &job->molecule);
     return status == OVOID_OK ? ovoid_model_read(job->context, job->model_path, &job->model)
                               : status;
 }
 
 static void print_before(const measure_job *job) {
     const ovoid_device_info *device = ovoid_context_device(job->context);
-    const size_t atoms = ovoid_molecule_atoms(job->molecule), size = ovoid_model_size(job->model);
+    const size_t size = ovoid_model_size(job->model);
     if (!job->summary)
         return;
-    fprintf(job->summary, "molecule  %s: %zu atom%s\n", source_name(job->molecule_path), atoms,
-            atoms == 1 ? "" : "s");
+    reading_print(&job->reading, job->summary, job->molecule_path, job->molecule);
     fprintf(job->summary, "model     %s: %zu ellipsoid%s, decay %.9g Å⁻²\n",
             source_name(job->model_path), size, size == 1 ? "" : "s",
             ovoid_model_decay(job->model));
@@ -305,14 +307,13 @@ static bool report_row(cJSON *object, const measure_job *job, const measure_row 
 
 /* With one isovalue its measures stand in the report itself; `rows` holds them in any case. */
 static bool fill_report(cJSON *json, const measure_job *job) {
-    bool good =
-        json && cli_json_string(json, "version", ovoid_version()) &&
-        cli_json_string(json, "molecule", job->molecule_path) &&
-        cli_json_string(json, "model", job->model_path) &&
-        cJSON_AddNumberToObject(json, "atoms", (double)ovoid_molecule_atoms(job->molecule)) &&
-        cJSON_AddNumberToObject(json, "ellipsoids", (double)ovoid_model_size(job->model)) &&
-        cJSON_AddNumberToObject(json, "decay", ovoid_model_decay(job->model)) &&
-        cli_json_string(json, "device", ovoid_context_device(job->context)->name);
+    bool good = json && cli_json_string(json, "version", ovoid_version()) &&
+                cli_json_string(json, "molecule", job->molecule_path) &&
+                cli_json_string(json, "model", job->model_path) &&
+                reading_report(&job->reading, json, job->molecule) &&
+                cJSON_AddNumberToObject(json, "ellipsoids", (double)ovoid_model_size(job->model)) &&
+                cJSON_AddNumberToObject(json, "decay", ovoid_model_decay(job->model)) &&
+                cli_json_string(json, "device", ovoid_context_device(job->context)->name);
     if (good && job->row_count == 1)
         good = report_row(json, job, &job->rows[0]);
     cJSON *rows = good ? cJSON_AddArrayToObject(json, "rows") : NULL;

@@ -6,17 +6,11 @@
 #define CLI_MEASURES_H
 
 #include "cli.h"
+#include "reading.h"
 
 #include "ovoid/surface.h"
 
 /* ---- inputs (source.c) ---------------------------------------------------------------------- */
-
-/* The format of a file that holds a molecule or a model, as --format names it. */
-typedef enum source_format { SOURCE_AUTO = 0, SOURCE_PQR, SOURCE_XYZR, SOURCE_MODEL } source_format;
-
-/* Values of --format; report a usage error for others. */
-bool source_parse_format(const char *text, source_format *format);
-bool source_parse_molecule(const char *text, ovoid_molecule_format *format);
 
 /* One of the two. */
 typedef struct source {
@@ -24,8 +18,8 @@ typedef struct source {
     ovoid_model *model;
 } source;
 
-/* Reads a molecule or a model; SOURCE_AUTO as cli_is_model() has it. The source starts as {0}. */
-ovoid_status source_read(ovoid_context *context, const char *path, source_format format,
+/* Reads a molecule or a model. The source starts as {0}. */
+ovoid_status source_read(ovoid_context *context, const char *path, const reading *how,
                          source *read);
 void source_destroy(source *read);
 

@@ -11,7 +11,7 @@ typedef struct mesh_job {
     char *default_output; /* owned, output may point to it */
     const char *device;   /* NULL: the default */
     bool quiet, decay_given, isovalue_given;
-    source_format format;
+    reading reading;
     double decay; /* of molecules */
     ovoid_mesh_options options;
     FILE *summary; /* NULL: none */
@@ -42,19 +42,19 @@ void cli_mesh_help(FILE *stream) {
     fputs("Usage: ovoid mesh INPUT [OPTION]...\n"
           "\n"
           "Writes the surface of a molecule or of a model as a closed triangle mesh, made by\n"
-          "marching cubes, with normals from the field's gradient. INPUT is a molecule (PQR or\n"
-          "XYZR, also compressed with gzip), a model that 'ovoid fit' wrote, or - for standard\n"
-          "input.\n"
+          "marching cubes, with normals from the field's gradient. INPUT is a molecule (PDB,\n"
+          "mmCIF, PQR or XYZR, also compressed with gzip), a model that 'ovoid fit' wrote, or -\n"
+          "for standard input.\n"
           "\n"
           "Files:\n"
           "  -o, --output FILE   where the mesh goes; its name ends in .ply (binary), .obj, .stl\n"
           "                      (binary), .off or .glb (binary glTF) (default: the name of the\n"
           "                      input with the extension .ply, in the current folder)\n"
-          "  --format NAME       of the input: pqr, xyzr or ovoid (default: by its extension,\n"
-          "                      else by its contents; standard input is a model)\n"
           "\n"
-          "The file appears whole at the end or not at all; one that exists is replaced.\n"
-          "\n"
+          "The file appears whole at the end or not at all; one that exists is replaced.\n",
+          stream);
+    reading_help(stream, true);
+    fputs("\n"
           "Running:\n" CLI_HELP_RUNNING "\n"
           "The surface:\n",
           stream);
@@ -118,10 +118,10 @@ static bool complete(int argc, char **argv, mesh_job *job) {
 }
 
 static bool parse(int argc, char **argv, mesh_job *job, int *code) {
-    enum { OUTPUT = 256, DEVICE, FORMAT, VERTICES, QUIET, HELP, NUMBERS };
+    enum { OUTPUT = 256, DEVICE, VERTICES, QUIET, HELP, NUMBERS };
     static const struct option options[] = {{"output", required_argument, NULL, OUTPUT},
                                             {"device", required_argument, NULL, DEVICE},
-                                            {"format", required_argument, NULL, FORMAT},
+                                            READING_OPTIONS,
                                             {"vertices", required_argument, NULL, VERTICES},
                                             {"quiet", no_argument, NULL, QUIET},
                                             {"help", no_argument, NULL, HELP},
@@ -132,9 +132,14 @@ static bool parse(int argc, char **argv, mesh_job *job, int *code) {
     bool good = true;
     int option;
     set_defaults(job);
+    reading_init(&job->reading, true);
     opterr = 0;
     *code = CLI_USAGE;
     while (good && (option = getopt_long(argc, argv, ":o:qh", options, NULL)) != -1) {
+        if (reading_has(option)) {
+            good = reading_parse(&job->reading, option, optarg);
+            continue;
+        }
         switch (option) {
         case 'o':
         case OUTPUT:
@@ -142,9 +147,6 @@ static bool parse(int argc, char **argv, mesh_job *job, int *code) {
             break;
         case DEVICE:
             job->device = optarg;
-            break;
-        case FORMAT:
-            good = source_parse_format(optarg, &job->format);
             break;
         case VERTICES:
             good = measures_parse_vertices(optarg, &job->options.vertices);
@@ -224,13 +226,15 @@ static int run(mesh_job *job) {
     ovoid_status status = ovoid_file_check(job->context, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
-    status = source_read(job->context, job->input, job->format, &job->source);
+    status = source_read(job->context, job->input, &job->reading, &job->source);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
     if (job->source.model && job->decay_given) {
         cli_error("--decay is for molecules, but '%s' is a model", job->input);
         return CLI_USAGE;
     }
+    if (job->source.model && !reading_check_model(&job->reading, job->input))
+        return CLI_USAGE;
     if (job->source.model && !job->isovalue_given)
         job->options.isovalue = ovoid_model_isovalue(job->source.model);
     if ((status = ovoid_context_open_device(job->context, job->device)) != OVOID_OK)

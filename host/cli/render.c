@@ -12,7 +12,7 @@ typedef struct render_job {
     const char *model_path;    /* NULL: none */
     const char *output;
     const char *device;
-    ovoid_molecule_format format;
+    reading reading;
     ovoid_picture_options options;
     double decay;
     bool decay_given, isovalue_given, size_given, view_given, quiet;
@@ -55,7 +55,6 @@ enum {
     BACKGROUND,
     NO_CENTRES,
     NO_BAR,
-    FORMAT,
     DEVICE,
     QUIET,
     HELP,
@@ -74,7 +73,7 @@ static const struct option named[] = {
     {"background", required_argument, NULL, BACKGROUND},
     {"no-centres", no_argument, NULL, NO_CENTRES},
     {"no-bar", no_argument, NULL, NO_BAR},
-    {"format", required_argument, NULL, FORMAT},
+    READING_OPTIONS,
     {"device", required_argument, NULL, DEVICE},
     {"quiet", no_argument, NULL, QUIET},
     {"help", no_argument, NULL, HELP},
@@ -94,9 +93,9 @@ void cli_render_help(FILE *stream) {
         "Usage: ovoid render MOLECULE [MODEL] -o FILE.png [OPTION]...\n"
         "       ovoid render MODEL.ovoid -o FILE.png [OPTION]...\n"
         "\n"
-        "Takes a picture of the surface of the molecule in the file MOLECULE (PQR or XYZR, also\n"
-        "compressed with gzip, or - for standard input), of the surface of a MODEL that 'ovoid\n"
-        "fit' has written, or of both.\n"
+        "Takes a picture of the surface of the molecule in the file MOLECULE (PDB, mmCIF,\n"
+        "PQR or XYZR, also compressed with gzip, or - for standard input), of the surface of a\n"
+        "MODEL that 'ovoid fit' has written, or of both.\n"
         "\n"
         "What to show:\n"
         "  --view NAME         original    the molecule's surface\n"
@@ -133,18 +132,18 @@ void cli_render_help(FILE *stream) {
         "  --size WxH          pixels (default %ux%u, of a panel 2100x660)\n"
         "  --colour A[,B]      of the molecule's and of the model's surface, as RRGGBB or a name\n"
         "                      (default %06x,%06x)\n"
-        "  --background A      a colour or 'transparent' (default white)\n"
-        "\n"
-        "Running:\n"
-        "  --format NAME       of the molecule: pqr or xyzr (default: by its extension, else by\n"
-        "                      its contents)\n" CLI_HELP_RUNNING "\n"
-        "Examples:\n"
-        "  ovoid render molecule.pqr -o molecule.png\n"
-        "  ovoid render molecule.pqr model.ovoid --view difference -o difference.png\n"
-        "  ovoid render molecule.pqr model.ovoid --panel --rotate 0,90,0 -o side.png\n"
-        "\n",
+        "  --background A      a colour or 'transparent' (default white)\n",
         (unsigned)defaults.options.width, (unsigned)defaults.options.height,
         (unsigned)defaults.options.original >> 8, (unsigned)defaults.options.model >> 8);
+    reading_help(stream, false);
+    fputs("\n"
+          "Running:\n" CLI_HELP_RUNNING "\n"
+          "Examples:\n"
+          "  ovoid render molecule.pqr -o molecule.png\n"
+          "  ovoid render molecule.pqr model.ovoid --view difference -o difference.png\n"
+          "  ovoid render molecule.pqr model.ovoid --panel --rotate 0,90,0 -o side.png\n"
+          "\n",
+          stream);
     cli_print_environment(stream);
     putc('\n', stream);
     cli_print_exit_codes(stream);
@@ -365,8 +364,6 @@ static bool take_option(int option, render_job *job) {
     case NO_BAR:
         options->colour_bar = false;
         return true;
-    case FORMAT:
-        return source_parse_molecule(optarg, &job->format);
     case DEVICE:
         job->device = optarg;
         return true;
@@ -388,6 +385,7 @@ static bool parse(int argc, char **argv, render_job *job, int *code) {
     int option;
     memcpy(all, named, sizeof named);
     cli_number_options(numbers, NUMBER_COUNT, NUMBERS, all + NAMED_COUNT);
+    reading_init(&job->reading, false);
     opterr = 0;
     *code = CLI_USAGE;
     while ((option = getopt_long(argc, argv, ":o:qh", all, NULL)) != -1) {
@@ -400,7 +398,8 @@ static bool parse(int argc, char **argv, render_job *job, int *code) {
             *code = cli_bad_option("render", option, argv, all);
             return false;
         }
-        if (!take_option(option, job))
+        if (reading_has(option) ? !reading_parse(&job->reading, option, optarg)
+                                : !take_option(option, job))
             return false;
     }
     return complete(argc, argv, job);
@@ -411,7 +410,7 @@ static bool parse(int argc, char **argv, render_job *job, int *code) {
 static ovoid_status read_inputs(render_job *job) {
     ovoid_status status = OVOID_OK;
     if (job->molecule_path)
-        status = ovoid_molecule_read(job->context, job->molecule_path, job->format, &job->molecule);
+        status = reading_molecule(&job->reading, job->context, job->molecule_path, &job->molecule);
     if (status == OVOID_OK && job->model_path)
         status = ovoid_model_read(job->context, job->model_path, &job->model);
     if (status == OVOID_OK && job->model && !job->decay_given)
@@ -425,8 +424,7 @@ static void print_summary(const render_job *job) {
     FILE *const stream = strcmp(job->output, "-") == 0 ? stderr : stdout;
     const ovoid_device_info *const device = ovoid_context_device(job->context);
     if (job->molecule)
-        fprintf(stream, "molecule  %s: %zu atoms\n", source_name(job->molecule_path),
-                ovoid_molecule_atoms(job->molecule));
+        reading_print(&job->reading, stream, job->molecule_path, job->molecule);
     if (job->model)
         fprintf(stream, "model     %s: %zu ellipsoids\n", source_name(job->model_path),
                 ovoid_model_size(job->model));

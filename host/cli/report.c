@@ -43,13 +43,8 @@ static void add_numbers(builder *b, const cli_number *numbers, size_t count,
 }
 
 static void add_molecule(builder *b, const fit_job *job) {
-    ovoid_molecule_counts counts = ovoid_molecule_read_counts(job->molecule);
     add_string(b, "input", job->input);
-    add_number(b, "atoms", (double)counts.atoms);
-    add_number(b, "atoms_skipped", (double)counts.skipped);
-    add_number(b, "atoms_skipped_models", (double)counts.skipped_models);
-    add_number(b, "atoms_skipped_altlocs", (double)counts.skipped_altlocs);
-    add_number(b, "zero_radius_atoms", (double)counts.zero_radius);
+    b->good = b->good && reading_report(&job->reading, b->object, job->molecule);
 }
 
 /* A finite number or null. */

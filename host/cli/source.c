@@ -3,45 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool source_parse_molecule(const char *text, ovoid_molecule_format *format) {
-    if (strcmp(text, "pqr") == 0) {
-        *format = OVOID_MOLECULE_PQR;
-    } else if (strcmp(text, "xyzr") == 0) {
-        *format = OVOID_MOLECULE_XYZR;
-    } else {
-        cli_error("--format takes pqr or xyzr, not '%s'", text);
-        return false;
-    }
-    return true;
-}
-
-bool source_parse_format(const char *text, source_format *format) {
-    static const struct {
-        const char *name;
-        source_format format;
-    } names[] = {{"pqr", SOURCE_PQR}, {"xyzr", SOURCE_XYZR}, {"ovoid", SOURCE_MODEL}};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (strcmp(text, names[i].name) == 0) {
-            *format = names[i].format;
-            return true;
-        }
-    cli_error("--format takes pqr, xyzr or ovoid, not '%s'", text);
-    return false;
-}
-
-static bool is_model(const char *path, source_format format) {
-    return format == SOURCE_AUTO ? cli_is_model(path) : format == SOURCE_MODEL;
-}
-
-ovoid_status source_read(ovoid_context *context, const char *path, source_format format,
+ovoid_status source_read(ovoid_context *context, const char *path, const reading *how,
                          source *read) {
-    if (is_model(path, format))
-        return ovoid_model_read(context, path, &read->model);
-    return ovoid_molecule_read(context, path,
-                               format == SOURCE_PQR    ? OVOID_MOLECULE_PQR
-                               : format == SOURCE_XYZR ? OVOID_MOLECULE_XYZR
-                                                       : OVOID_MOLECULE_AUTO,
-                               &read->molecule);
+    return reading_is_model(how, path) ? ovoid_model_read(context, path, &read->model)
+                                       : reading_molecule(how, context, path, &read->molecule);
 }
 
 void source_destroy(source *read) {

@@ -9,33 +9,11 @@ static const char *plural(count number) {
     return number == 1 ? "" : "s";
 }
 
-static void print_molecule(const fit_job *job) {
-    ovoid_molecule_counts counts = ovoid_molecule_read_counts(job->molecule);
-    FILE *out = job->summary;
-    fprintf(out, "molecule  %s: %llu atom%s",
-            strcmp(job->input, "-") == 0 ? "standard input" : job->input, (count)counts.atoms,
-            plural(counts.atoms));
-    if (counts.zero_radius)
-        fprintf(out, ", %llu of them of radius 0", (count)counts.zero_radius);
-    if (counts.skipped)
-        fprintf(out, ", %llu skipped", (count)counts.skipped);
-    const char *between = " (";
-    if (counts.skipped_models) {
-        fprintf(out, "%s%llu in MODEL 2 and later", between, (count)counts.skipped_models);
-        between = ", ";
-    }
-    if (counts.skipped_altlocs) {
-        fprintf(out, "%s%llu at alternate locations", between, (count)counts.skipped_altlocs);
-        between = ", ";
-    }
-    fprintf(out, "%s\n", between[0] == ',' ? ")" : "");
-}
-
 void fit_summary_before(const fit_job *job) {
     const ovoid_device_info *device = ovoid_context_device(job->context);
     if (!job->summary)
         return;
-    print_molecule(job);
+    reading_print(&job->reading, job->summary, job->input, job->molecule);
     fprintf(job->summary, "device    %s (%s, driver %s)\n", device->name, device->platform,
             device->driver);
     fflush(job->summary);

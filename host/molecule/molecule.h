@@ -11,10 +11,20 @@
 #define OV_COORDINATE_LIMIT 1e6 /* |x|, |y|, |z|, angstrom */
 #define OV_RADIUS_LIMIT 100.0   /* angstrom */
 
+enum { OV_GUESSES_MAX = 64 };
+
 struct ovoid_molecule {
     double *xyzr; /* 4 * atoms, owned */
     size_t atoms;
+    ovoid_atom *identity; /* atoms of them, owned; NULL: none */
+    ovoid_residue *residues;
+    size_t residue_count;
     ovoid_molecule_counts counts;
+    ovoid_molecule_format format;
+    ovoid_radii radii;
+    int32_t model;
+    ovoid_guess *guesses;
+    size_t guess_count;
 };
 
 #endif

@@ -23,6 +23,7 @@
  * that touch without a sign between them, and numeric segment names behind the radius.
  * 3. Where that fails too, the line is an error. A line is never skipped or half understood.
  */
+#include "molecule/pdb.h"
 #include "molecule/reader.h"
 
 #include <math.h>
@@ -317,7 +318,7 @@ static void suspect_pdb(ov_pdb_suspicion *pdb, const ov_line *line, const ov_fie
 
 /* Most occupancies are 1.00; besides, something must be there that PQR files do not have: header
  * records, elements, or temperature factors no radius could be. */
-static bool is_pdb(const ov_reader *reader) {
+bool ov_pqr_is_pdb(const ov_reader *reader) {
     const ov_pdb_suspicion *pdb = &reader->pdb;
     const double largest_radius = 5; /* angstrom; the largest atom has 3.5 */
     size_t atoms = reader->molecule->atoms;
@@ -328,13 +329,91 @@ static bool is_pdb(const ov_reader *reader) {
 static ovoid_status fail_as_pdb(const ov_reader *reader) {
     return ov_fail(reader->context, OVOID_ERROR_FORMAT,
                    "%s: this looks like a PDB file, with occupancies and temperature factors where "
-                   "PQR has charges and radii; convert it, for example with pdb2pqr (if the last "
-                   "column does hold radii, ask for the format PQR explicitly)",
+                   "PQR has charges and radii; ask for the format PDB, or, if the last column does "
+                   "hold radii, for the format PQR",
                    ov_text_name(reader->text));
 }
 
 ovoid_status ov_pqr_end(ov_reader *reader) {
-    return reader->guess && is_pdb(reader) ? fail_as_pdb(reader) : OVOID_OK;
+    return reader->guess && ov_pqr_is_pdb(reader) ? fail_as_pdb(reader) : OVOID_OK;
+}
+
+/* ---- who the atom is ---------------------------------------------------------------------- */
+
+typedef struct ov_word {
+    const char *text;
+    size_t length;
+} ov_word;
+
+/* "A", "12", "12B", "A12" or "A12B" as chain, number and insertion code, as far as they are there.
+ */
+static void read_number(const ov_word *word, ov_site *site) {
+    size_t at = 0;
+    while (at < word->length && !ov_digit(word->text[at]) && word->text[at] != '-')
+        at++;
+    if (at > 0 && !site->chain[0])
+        ov_site_text(site->chain, sizeof site->chain, word->text, at);
+    ov_number number;
+    const size_t used = ov_number_parse(word->text + at, word->length - at, &number);
+    if (used == 0 || number.point || !(fabs(number.value) < 2147483648.0))
+        return;
+    site->number = (int32_t)number.value;
+    if (at + used + 1 == word->length)
+        site->insertion = word->text[at + used];
+}
+
+/* The words in front of x: [serial] name residue [chain] number [insertion code]. */
+static void read_names(ov_reader *reader, const char *begin, const char *x, ov_site *site) {
+    ov_word words[8];
+    size_t count = 0, first = 0;
+    ov_number serial;
+    while (count < 8 && (words[count].text = ov_word_next(&begin, x, &words[count].length)))
+        count++;
+    if (count && ov_number_parse(words[0].text, words[0].length, &serial) == words[0].length &&
+        !serial.point && fabs(serial.value) < 2147483648.0) {
+        site->serial = (int32_t)serial.value;
+        first = 1;
+    }
+    if (count > first)
+        reader->sites.cut_names +=
+            !ov_site_text(site->name, sizeof site->name, words[first].text, words[first].length);
+    if (count > first + 1)
+        reader->sites.cut_names += !ov_site_text(site->residue, sizeof site->residue,
+                                                 words[first + 1].text, words[first + 1].length);
+    for (size_t i = first + 2; i < count; i++) {
+        const bool alone = i == first + 2 && count > first + 3; /* a chain of its own */
+        if (alone)
+            ov_site_text(site->chain, sizeof site->chain, words[i].text, words[i].length);
+        else if (site->number == OVOID_NO_NUMBER)
+            read_number(&words[i], site);
+        else if (words[i].length == 1)
+            site->insertion = *words[i].text;
+    }
+}
+
+/* By the columns of PDB where the line keeps to them, else by words. What cannot be told apart is
+ * left empty: the surface does without. */
+static void read_site(ov_reader *reader, const ov_line *line, const char *begin, const char *x,
+                      ov_site *site) {
+    const size_t at = (size_t)(x - line->text);
+    const char *last = x;
+    while (last < line->text + line->length && !ov_blank(*last))
+        last++;
+    const bool columns = at >= 30 && last - line->text == 38 && ov_letter(*line->text) &&
+                         ov_digit(line->text[25]) && ov_blank(line->text[11]) &&
+                         ov_blank(line->text[27]) && ov_blank(line->text[28]) &&
+                         !memchr(line->text, '\t', 38);
+    if (columns) {
+        ov_pdb_site(line, site);
+        if (line->length > 54) /* what stands in the columns of the element is something else */
+            site->element = ov_element_of_name(site->name, site->residue, line->text + 12);
+        return;
+    }
+    *site = (ov_site){.occupancy = 1.0f, .number = OVOID_NO_NUMBER};
+    site->hetero = begin - line->text >= 6 && ov_begins_with(begin - 6, 6, "HETATM");
+    read_names(reader, begin, x, site);
+    memcpy(site->part, site->chain, sizeof site->part);
+    site->element = ov_element_of_name(site->name, site->residue, NULL);
 }
 
 /* ---- lines -------------------------------------------------------------------------------- */
@@ -354,17 +433,10 @@ static ovoid_status read_atom(ov_reader *reader, const ov_line *line, const char
         if (!reader->pdb.cleared && reader->pdb.largest > OV_RADIUS_LIMIT)
             return fail_as_pdb(reader);
     }
-    return ov_reader_add(reader, line, &fields[X], &fields[Y], &fields[Z], &fields[RADIUS]);
-}
-
-/* The first model that holds atoms is read. Atoms behind its end are another model's even where no
- * MODEL record says so: some programs put nothing but ENDMDL between models. */
-static void follow_models(ov_reader *reader, const char *text, size_t length) {
-    bool atoms = reader->molecule->atoms > 0;
-    if (is_record(text, length, "MODEL"))
-        reader->models = atoms ? reader->models + 1 : 1;
-    else if (is_record(text, length, "ENDMDL"))
-        reader->model_ended = reader->model_ended || atoms;
+    ov_site site;
+    read_site(reader, line, begin, fields[X].text, &site);
+    return ov_reader_add_site(reader, line, &fields[X], &fields[Y], &fields[Z], &fields[RADIUS],
+                              &site);
 }
 
 /* A line of no known kind is ignored, but not one that holds what an atom does: a misspelt record
@@ -392,16 +464,12 @@ ovoid_status ov_pqr_line(ov_reader *reader, const ov_line *line) {
     size_t length = (size_t)(end - text);
     size_t record = atom_record(text, length);
     if (record) {
-        if (reader->models < 2 && !reader->model_ended)
-            return read_atom(reader, line, text + record);
-        reader->molecule->counts.skipped++;
-        reader->molecule->counts.skipped_models++;
-        return OVOID_OK;
+        return ov_sites_wanted(reader) ? read_atom(reader, line, text + record) : OVOID_OK;
     }
     if (is_comment(text, length))
         return OVOID_OK;
     if (is_record(text, length, other_records)) {
-        follow_models(reader, text, length);
+        ov_pdb_follow_models(reader, text, length);
         return OVOID_OK;
     }
     if (is_record(text, length, pdb_records)) {

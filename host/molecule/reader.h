@@ -7,6 +7,7 @@
 
 #include "molecule/fields.h"
 #include "molecule/molecule.h"
+#include "molecule/sites.h"
 #include "molecule/text.h"
 
 /* Whether the atoms seen so far might be those of a PDB file under another name (pqr.c). */
@@ -24,25 +25,36 @@ typedef struct ov_reader {
     ovoid_molecule *molecule;
     size_t capacity; /* atoms that molecule->xyzr has room for */
     bool guess;      /* the caller left the format open */
+    const ovoid_read_options *options;
+    ov_sites sites; /* who the atoms are, and which of them stay */
 
     uint64_t unknown_lines; /* lines ignored for not being any known record */
     uint64_t unknown_first; /* number of the first of them */
     ov_quote unknown_text;
 
     /* PQR */
-    uint64_t models;  /* MODEL records up to here, less those of models without atoms */
-    bool model_ended; /* ENDMDL behind an atom: what follows belongs to another model */
     ov_pdb_suspicion pdb;
+
+    /* PDB */
+    uint64_t pqr_like; /* atoms whose occupancy is none: charges of a PQR file? */
 
     /* XYZR */
     bool announced; /* the file began with a count line */
     uint64_t announced_line;
     double announced_atoms;
+
+    struct ov_cif *cif; /* cif.c */
 } ov_reader;
 
-/* Appends an atom after checking that x, y, z and radius are finite and within the limits. */
+/* Appends an atom after checking that x, y, z and radius are finite and within the limits. A radius
+ * of NULL is one that comes later. */
 ovoid_status ov_reader_add(ov_reader *reader, const ov_line *line, const ov_field *x,
                            const ov_field *y, const ov_field *z, const ov_field *radius);
+
+/* The same with its identity, unless the choices of the caller leave it out: then it is counted. */
+ovoid_status ov_reader_add_site(ov_reader *reader, const ov_line *line, const ov_field *x,
+                                const ov_field *y, const ov_field *z, const ov_field *radius,
+                                const ov_site *site);
 
 /* Counts a line that is left out without being understood. */
 void ov_reader_ignore(ov_reader *reader, const ov_line *line);
@@ -52,7 +64,25 @@ bool ov_pqr_knows(const char *text, size_t length);
 ovoid_status ov_pqr_line(ov_reader *reader, const ov_line *line);
 ovoid_status ov_pqr_end(ov_reader *reader);
 
+/* Whether the atoms read as PQR so far are those of a PDB file. */
+bool ov_pqr_is_pdb(const ov_reader *reader);
+
 ovoid_status ov_xyzr_line(ov_reader *reader, const ov_line *line);
 ovoid_status ov_xyzr_end(ov_reader *reader);
+
+/* Whether the line is an atom in the columns of a PDB file. */
+bool ov_pdb_knows(const ov_line *line);
+
+/* Whether it is an atom, but its record is not in the columns of a PDB file. */
+bool ov_pdb_misses(const ov_line *line);
+ovoid_status ov_pdb_line(ov_reader *reader, const ov_line *line);
+ovoid_status ov_pdb_end(ov_reader *reader);
+
+/* MODEL and ENDMDL records, of PDB and PQR files alike. */
+void ov_pdb_follow_models(ov_reader *reader, const char *text, size_t length);
+
+ovoid_status ov_cif_line(ov_reader *reader, const ov_line *line);
+ovoid_status ov_cif_end(ov_reader *reader);
+void ov_cif_destroy(struct ov_cif **cif);
 
 #endif

@@ -71,7 +71,7 @@ wrong 2 "--opacity is 2, but must be at most 1" m.ovoid -o m.py --opacity 2
 wrong 2 "--spacing is 0, but must be above 0" m.ovoid -o m.mrc --spacing 0
 wrong 2 "did you mean '--spacing'?" m.ovoid -o m.mrc --spcing 1
 wrong 2 "a molecule has no ellipsoids" a.xyzr -o a.py
-wrong 2 "--format takes pqr, xyzr or ovoid, not 'pdb'" a.xyzr -o m.py --format pdb
+wrong 2 "--format takes pdb, mmcif, pqr, xyzr or ovoid, not 'mol2'" a.xyzr -o m.py --format mol2
 wrong 3 "missing.ovoid" missing.ovoid -o m.py
 wrong 4 "there is no folder 'no'" m.ovoid -o no/m.py
 wrong 4 "Is a directory" m.ovoid -o .

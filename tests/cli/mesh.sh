@@ -88,7 +88,7 @@ refused 2 "name the mesh's file with -o" -
 refused 2 "are the same file" a.xyzr -o ./a.xyzr
 refused 2 "--decay is for molecules, but 'a.ovoid' is a model" a.ovoid -o b.ply --decay 1
 refused 2 "--vertices takes exact or linear, not 'round'" a.xyzr --vertices round
-refused 2 "--format takes pqr, xyzr or ovoid, not 'pdb'" a.xyzr --format pdb
+refused 2 "--format takes pdb, mmcif, pqr, xyzr or ovoid, not 'mol2'" a.xyzr --format mol2
 refused 2 "--spacing is 0, but must be above 0 Å" a.xyzr --spacing 0
 refused 2 "--isovalue takes a number, not 'x'" a.xyzr --isovalue x
 refused 2 "did you mean '--isovalue'?" a.xyzr --isovlue 1

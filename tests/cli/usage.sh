@@ -52,7 +52,7 @@ wrong "--sparse-iterations is 20, but there are only 10" fit a.xyzr --method l1 
 wrong "--method takes adaptive or l1, not 'best'" fit a.xyzr --method best
 wrong "--kernel takes ellipsoid or sphere, not 'cube'" fit a.xyzr --kernel cube
 wrong "--first-step takes secant or grow, not 'best'" fit a.xyzr --first-step best
-wrong "--format takes pqr or xyzr, not 'pdb'" fit a.xyzr --format pdb
+wrong "--format takes pdb, mmcif, pqr or xyzr, not 'mol2'" fit a.xyzr --format mol2
 wrong "--spacing is 0, but must be above 0 Å" fit a.xyzr --spacing 0
 wrong "--tolerance is 0, but must be above 0 Å" fit a.xyzr --tolerance 0
 wrong "--ellipsoids is 0, but must be at least 1" fit a.xyzr --ellipsoids 0

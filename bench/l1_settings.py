@@ -38,13 +38,14 @@ import tempfile
 from common import find, paper_counts, paper_table, read_table, report_of, short, write_table
 
 DEFAULTS = {"spacing": 1.25, "padding": 3.0, "epsilon": 0.05, "inside-every": 1,
-            "first-step": "secant"}
+            "first-step": "secant", "iterations": 8000}
 GRID = [{"spacing": s} for s in (0.8, 1.0, 1.1, 1.15, 1.2, 1.25, 1.3, 1.35, 1.4)]
+GRID += [{"iterations": n, "spacing": s} for n in (16000, 32000) for s in (1.0, 1.1, 1.25)]
 GRID += [{"padding": p} for p in (1.5, 2.0, 2.5, 4.0)]
 GRID += [{"epsilon": e} for e in (0.01, 0.02, 0.1, 0.2)]
 GRID += [{"inside-every": 0}, {"inside-every": 2}, {"first-step": "grow"}]
 ERRORS = ("area_error", "volume_error", "hausdorff")
-COLUMNS = ("molecule pose spacing padding epsilon inside-every first-step points iterations "
+COLUMNS = ("molecule pose spacing padding epsilon inside-every first-step iterations points "
            "ellipsoids area_error volume_error hausdorff area_error_outer volume_error_outer "
            "hausdorff_outer rms_error max_error").split()
 MESH = ("--vertices", "linear", "--spacing", "0.5")
@@ -93,7 +94,7 @@ def run(ovoid, path, molecule, pose, setting, folder):
         # An ellipsoid that nothing holds beyond the points may reach a thousand angstroms.
         measured = None
     row = {"molecule": molecule, "pose": pose, **setting}
-    for key in ("points", "iterations", "ellipsoids", "rms_error", "max_error"):
+    for key in ("points", "ellipsoids", "rms_error", "max_error"):
         row[key] = short(fitted[key])
     for part in ("", "_outer"):
         for name in ("area", "volume"):
@@ -105,7 +106,8 @@ def run(ovoid, path, molecule, pose, setting, folder):
 
 def key_of(row):
     return (row["molecule"], int(row["pose"]), float(row["spacing"]), float(row["padding"]),
-            float(row["epsilon"]), int(row["inside-every"]), row["first-step"])
+            float(row["epsilon"]), int(row["inside-every"]), row["first-step"],
+            int(row["iterations"]))
 
 
 def mean(values):
@@ -125,7 +127,7 @@ def summarise(rows, names, limits, counts):
     for row in rows:
         by_setting[key_of(row)[2:]][row["molecule"]].append(row)
     best = None
-    print("spacing padding epsilon inside step    molecule  poses      ellipsoids (paper)   area %"
+    print("spacing padding epsilon inside step   iterations molecule  poses      ellipsoids (paper)   area %"
           "        volume %      Hausdorff      outer H   above the paper's")
     for setting, molecules in sorted(by_setting.items()):
         square, above, multiples = [], [], collections.defaultdict(list)
@@ -142,6 +144,7 @@ def summarise(rows, names, limits, counts):
                 f"{scale * means[e]:6.2f} ({scale * limits[name][e]:.2f})" if name in limits
                 else f"{scale * means[e]:6.2f}       " for e, scale in zip(ERRORS, (100, 100, 1)))
             print(f"{setting[0]:7} {setting[1]:7} {setting[2]:7} {setting[3]:6} {setting[4]:7}"
+                  f"{setting[5]:10} "
                   f"{name:9} {len(own):5} {mean(values):9.1f} ±{spread(values):5.1f} "
                   f"({counts[name]}) {text} {means['hausdorff_outer']:6.2f}   {' '.join(over)}")
         score = math.sqrt(mean(square))

@@ -227,6 +227,8 @@ ovoid_status ov_pdb_line(ov_reader *reader, const ov_line *line) {
     else if (ov_pdb_misses(line))
         return ov_text_fail(reader->text, line, text,
                             "an atom whose record is not in the columns of a PDB file");
+    else if (ov_begins_with(text, line->length, "REMARK"))
+        return ov_assembly_remark(reader->context, &reader->assemblies, reader->text, line);
     else
         ov_pdb_follow_models(reader, text, line->length);
     return OVOID_OK;

@@ -470,7 +470,7 @@ ovoid_status ov_pqr_line(ov_reader *reader, const ov_line *line) {
         return OVOID_OK;
     if (is_record(text, length, other_records)) {
         ov_pdb_follow_models(reader, text, length);
-        return OVOID_OK;
+        return ov_assembly_remark(reader->context, &reader->assemblies, reader->text, line);
     }
     if (is_record(text, length, pdb_records)) {
         reader->pdb.header = true;

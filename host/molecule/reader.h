@@ -5,6 +5,7 @@
 #ifndef OV_MOLECULE_READER_H
 #define OV_MOLECULE_READER_H
 
+#include "molecule/assembly.h"
 #include "molecule/fields.h"
 #include "molecule/molecule.h"
 #include "molecule/sites.h"
@@ -42,6 +43,8 @@ typedef struct ov_reader {
     bool announced; /* the file began with a count line */
     uint64_t announced_line;
     double announced_atoms;
+
+    ov_assembly_source assemblies;
 
     struct ov_cif *cif; /* cif.c */
 } ov_reader;

@@ -383,7 +383,7 @@ static ovoid_status resolve_altlocs(ov_reader *reader, unsigned char *keep) {
 /* ---- the end -------------------------------------------------------------------------------- */
 
 /* Moves what stays together. Residues without atoms go. */
-static void compact(ov_reader *reader, const unsigned char *keep) {
+void ov_sites_compact(ov_reader *reader, const unsigned char *keep) {
     ovoid_molecule *m = reader->molecule;
     ov_sites *sites = &reader->sites;
     size_t atoms = 0, residues = 0;
@@ -420,7 +420,7 @@ static ovoid_status decide(ov_reader *reader) {
         OV_TRY(select_atoms(reader, keep));
     if (reader->sites.altlocs)
         OV_TRY(resolve_altlocs(reader, keep));
-    compact(reader, keep);
+    ov_sites_compact(reader, keep);
 cleanup:
     free(keep);
     return status;

@@ -161,7 +161,9 @@ static int by_id(const void *a, const void *b) {
 
 static const ov_operator *find_operator(ov_assembly_source *source, const char *id) {
     ov_operator key = {{0}, {0}, {0}};
-    if (!source->sorted) /* only mmCIF looks for names, and its generators have expressions */
+    if (!source->sorted &&
+        source
+            ->operator_count) /* only mmCIF looks for names, and its generators have expressions */
         qsort(source->operators, source->operator_count, sizeof key, by_id);
     source->sorted = true;
     if (!ov_site_text(key.id, sizeof key.id, id, strlen(id)) || !source->operator_count)

@@ -256,7 +256,7 @@ static void read_number(const ov_cif *cif, ov_site *site) {
     const value *v = &cif->row[column];
     ov_number number;
     const char last = v->length ? text_of(cif, column)[v->length - 1] : '\0';
-    if (ov_letter(last) && v->length < 11 &&
+    if (ov_letter(last) && v->length > 1 && v->length < 11 &&
         ov_number_parse(text_of(cif, column), v->length - 1, &number) == v->length - 1 &&
         !number.point) {
         site->number = (int32_t)number.value;

@@ -15,6 +15,7 @@
 typedef struct ov_pdb_suspicion {
     bool cleared;     /* some atom cannot have come from a PDB file */
     bool header;      /* records that PDB files have and PQR files hardly ever */
+    uint64_t atoms;   /* seen */
     uint64_t ones;    /* atoms whose occupancy would be 1.00 */
     uint64_t element; /* atoms with an element in the PDB columns */
     double largest;   /* temperature factor */

@@ -368,7 +368,8 @@ static ovoid_status resolve_altlocs(ov_reader *reader, unsigned char *keep) {
             one->atom = (uint32_t)i;
             memcpy(one->chain, residue->chain, sizeof one->chain);
         }
-    qsort(atoms, count, sizeof *atoms, by_residue_and_atom);
+    if (count)
+        qsort(atoms, count, sizeof *atoms, by_residue_and_atom);
     for (size_t begin = 0, end; begin < count; begin = end) {
         end = begin + 1;
         while (end < count && by_residue(&atoms[begin], &atoms[end]) == 0)

@@ -231,6 +231,8 @@ static void print_summary(const export_job *job) {
 static int run(export_job *job) {
     ovoid_export_options *options = &job->numbers.options;
     ovoid_export_format format = format_of(job);
+    if (reading_lists(&job->reading))
+        return reading_list(&job->reading, job->context, job->input);
     ovoid_status status = ovoid_file_check(job->context, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);

@@ -305,6 +305,8 @@ static int compare_with_goal(const fit_job *job) {
 }
 
 static int run(fit_job *job) {
+    if (reading_lists(&job->reading))
+        return reading_list(&job->reading, job->context, job->input);
     ovoid_status status = check_outputs(job);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);

@@ -336,6 +336,8 @@ static ovoid_status write_report(const measure_job *job) {
 }
 
 static int run(measure_job *job) {
+    if (reading_lists(&job->reading))
+        return reading_list(&job->reading, job->context, job->molecule_path);
     ovoid_status status = job->report ? ovoid_file_check(job->context, job->report) : OVOID_OK;
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);

@@ -182,9 +182,9 @@ static void print_before(const mesh_job *job) {
                 ovoid_model_size(job->source.model),
                 ovoid_model_size(job->source.model) == 1 ? "" : "s");
     else
-        fprintf(job->summary, "molecule  %s: %zu atom%s, decay %.9g Å⁻²\n", source_name(job->input),
-                ovoid_molecule_atoms(job->source.molecule),
-                ovoid_molecule_atoms(job->source.molecule) == 1 ? "" : "s", job->decay);
+        reading_print(&job->reading, job->summary, job->input, job->source.molecule);
+    if (job->source.molecule)
+        fprintf(job->summary, "field     decay %.9g Å⁻²\n", job->decay);
     fprintf(job->summary, "device    %s (%s, driver %s)\n", device->name, device->platform,
             device->driver);
     fflush(job->summary);
@@ -223,6 +223,8 @@ static ovoid_status make_mesh(mesh_job *job) {
 }
 
 static int run(mesh_job *job) {
+    if (reading_lists(&job->reading))
+        return reading_list(&job->reading, job->context, job->input);
     ovoid_status status = ovoid_file_check(job->context, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);

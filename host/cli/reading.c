@@ -61,6 +61,10 @@ bool reading_parse(reading *r, int option, const char *value) {
     case READING_MODEL:
         r->given = "model";
         return cli_number_parse(&model_number, value, r);
+    case READING_ASSEMBLY:
+        r->given = "assembly";
+        r->options.assembly = value;
+        return true;
     case READING_WATERS:
         r->given = "waters";
         r->options.waters = true;
@@ -91,6 +95,10 @@ void reading_help(FILE *stream, bool models) {
                     "(residues), (ALA), [!C] (elements), ;polymer",
                     stream);
     cli_option_help("--model N", "the model of this number (default: the first)", stream);
+    cli_option_help("--assembly ID",
+                    "this assembly that the file describes, all its copies; 'list' prints which "
+                    "there are, and does nothing else (default: the atoms as they are in the file)",
+                    stream);
     cli_option_help("--waters", "keep the waters of PDB and mmCIF files", stream);
     cli_option_help("--no-hydrogens", "leave hydrogens out", stream);
 }
@@ -110,6 +118,31 @@ ovoid_status reading_molecule(const reading *r, ovoid_context *context, const ch
     ovoid_read_options options = r->options;
     options.format = formats[r->format];
     return ovoid_molecule_read_with(context, path, &options, molecule);
+}
+
+bool reading_lists(const reading *r) {
+    return r->options.assembly && strcmp(r->options.assembly, "list") == 0;
+}
+
+int reading_list(const reading *r, ovoid_context *context, const char *path) {
+    reading all = *r;
+    ovoid_molecule *molecule = NULL;
+    size_t entries;
+    all.options.assembly = NULL;
+    const ovoid_status status = reading_molecule(&all, context, path, &molecule);
+    if (status != OVOID_OK)
+        return cli_failure(context, status, CLI_INPUT);
+    const ovoid_assembly_info *info = ovoid_molecule_assemblies(molecule, &entries);
+    printf("%s: %zu atoms in the file\n", source_name(path), ovoid_molecule_atoms(molecule));
+    if (entries == 0)
+        puts("it describes no assemblies");
+    else
+        printf("%-10s  %10s  %12s\n", "assembly", "placements", "atoms");
+    for (size_t i = 0; i < entries; i++)
+        printf("%-10s  %10llu  %12llu\n", info[i].id, (count)info[i].placements,
+               (count)info[i].atoms);
+    ovoid_molecule_destroy(&molecule);
+    return CLI_OK;
 }
 
 bool reading_check_model(const reading *r, const char *path) {
@@ -134,6 +167,7 @@ static void print_skipped(FILE *out, const ovoid_molecule_counts *c) {
                    {c->skipped_waters, "of waters"},
                    {c->skipped_hydrogens, "hydrogens"},
                    {c->skipped_selection, "not selected"},
+                   {c->skipped_assembly, "not in the assembly"},
                    {c->skipped_altlocs, "at other alternate locations"}};
     const char *between = " (";
     fprintf(out, ", %llu skipped", (count)c->skipped);
@@ -143,6 +177,17 @@ static void print_skipped(FILE *out, const ovoid_molecule_counts *c) {
             between = ", ";
         }
     fputs(between[0] == ',' ? ")" : "", out);
+}
+
+/* What an assembly is made of, and what its atoms take. */
+static void print_assembly(const reading *r, FILE *out, const ovoid_molecule *molecule) {
+    size_t placements;
+    if (!ovoid_molecule_placements(molecule, &placements))
+        return;
+    fprintf(out, "assembly  %s: %zu placement%s of %zu atoms of the file, %.1f MB\n",
+            r->options.assembly, placements, plural(placements),
+            ovoid_molecule_unit_atoms(molecule),
+            (double)ovoid_molecule_atoms(molecule) * 4 * sizeof(double) / 1e6);
 }
 
 static bool is_structure(const ovoid_molecule *molecule) {
@@ -181,6 +226,7 @@ void reading_print(const reading *r, FILE *out, const char *path, const ovoid_mo
     if (c.skipped)
         print_skipped(out, &c);
     putc('\n', out);
+    print_assembly(r, out, molecule);
     print_radii(r, out, molecule, &c);
 }
 
@@ -208,11 +254,13 @@ static bool report_counts(cJSON *object, const ovoid_molecule *molecule) {
         const char *key;
         uint64_t value;
     } numbers[] = {{"atoms", c.atoms},
+                   {"unit_atoms", c.unit_atoms},
                    {"atoms_skipped", c.skipped},
                    {"atoms_skipped_models", c.skipped_models},
                    {"atoms_skipped_waters", c.skipped_waters},
                    {"atoms_skipped_hydrogens", c.skipped_hydrogens},
                    {"atoms_skipped_selection", c.skipped_selection},
+                   {"atoms_skipped_assembly", c.skipped_assembly},
                    {"atoms_skipped_altlocs", c.skipped_altlocs},
                    {"zero_radius_atoms", c.zero_radius},
                    {"zero_occupancy_atoms", c.zero_occupancy},
@@ -257,7 +305,16 @@ static bool report_radii(const reading *r, cJSON *object, const ovoid_molecule *
     return good;
 }
 
+static bool report_assembly(const reading *r, cJSON *object, const ovoid_molecule *molecule) {
+    size_t placements;
+    if (!ovoid_molecule_placements(molecule, &placements))
+        return cJSON_AddNullToObject(object, "assembly") != NULL;
+    return cli_json_string(object, "assembly", r->options.assembly) &&
+           cJSON_AddNumberToObject(object, "placements", (double)placements);
+}
+
 bool reading_report(const reading *r, cJSON *object, const ovoid_molecule *molecule) {
-    return cli_json_string(object, "format", format_name(molecule)) &&
+    return report_assembly(r, object, molecule) &&
+           cli_json_string(object, "format", format_name(molecule)) &&
            report_counts(object, molecule) && report_radii(r, object, molecule);
 }

@@ -31,6 +31,7 @@ enum {
     READING_RADII,
     READING_SELECT,
     READING_MODEL,
+    READING_ASSEMBLY,
     READING_WATERS,
     READING_NO_HYDROGENS,
     READING_END
@@ -42,6 +43,7 @@ enum {
         {"radii", required_argument, NULL, READING_RADII},                                         \
         {"select", required_argument, NULL, READING_SELECT},                                       \
         {"model", required_argument, NULL, READING_MODEL},                                         \
+        {"assembly", required_argument, NULL, READING_ASSEMBLY},                                   \
         {"waters", no_argument, NULL, READING_WATERS}, {                                           \
         "no-hydrogens", no_argument, NULL, READING_NO_HYDROGENS                                    \
     }
@@ -58,6 +60,11 @@ bool reading_parse(reading *r, int option, const char *value);
 
 /* The part of a help about them, with a heading. */
 void reading_help(FILE *stream, bool models);
+
+/* Whether --assembly list asks for no work but a list; and that list, on standard output. Returns
+ * the exit code. */
+bool reading_lists(const reading *r);
+int reading_list(const reading *r, ovoid_context *context, const char *path);
 
 /* Whether a file is to be read as a model: by --format, else as cli_is_model() has it. */
 bool reading_is_model(const reading *r, const char *path);

@@ -454,6 +454,8 @@ static int write_picture(render_job *job) {
 }
 
 static int run(render_job *job) {
+    if (reading_lists(&job->reading) && job->molecule_path)
+        return reading_list(&job->reading, job->context, job->molecule_path);
     ovoid_status status = ovoid_file_check(job->context, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);

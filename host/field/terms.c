@@ -8,6 +8,10 @@
 
 ovoid_status ov_atoms_check(ovoid_context *context, const double *xyzr, size_t atoms,
                             double decay) {
+    if (!xyzr && atoms)
+        return ov_fail(context, OVOID_ERROR_MEMORY,
+                       "out of memory for the assembly's %zu atoms (%.1f MB)", atoms,
+                       (double)atoms * 4 * sizeof *xyzr / 1e6);
     for (size_t i = 0; i < atoms; ++i) {
         const double radius = xyzr[4 * i + 3];
         if (decay * radius * radius > OV_EXPONENT_MAX)

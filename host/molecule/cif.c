@@ -97,6 +97,8 @@ enum {
 
 static ovoid_status read_atom(ov_reader *reader, const ov_line *line);
 static ovoid_status read_entity(ov_reader *reader, const ov_line *line);
+static ovoid_status read_operator(ov_reader *reader, const ov_line *line);
+static ovoid_status read_generator(ov_reader *reader, const ov_line *line);
 static ovoid_status check_atom_columns(ov_reader *reader, const ov_line *line);
 
 static const struct {
@@ -127,6 +129,14 @@ static const struct {
       [MODEL] = "PDBX_PDB_MODEL_NUM"},
      read_atom},
     {"_ENTITY.", {"ID", "TYPE"}, read_entity},
+    {"_PDBX_STRUCT_OPER_LIST.",
+     {"ID", "MATRIX[1][1]", "MATRIX[1][2]", "MATRIX[1][3]", "MATRIX[2][1]", "MATRIX[2][2]",
+      "MATRIX[2][3]", "MATRIX[3][1]", "MATRIX[3][2]", "MATRIX[3][3]", "VECTOR[1]", "VECTOR[2]",
+      "VECTOR[3]"},
+     read_operator},
+    {"_PDBX_STRUCT_ASSEMBLY_GEN.",
+     {"ASSEMBLY_ID", "OPER_EXPRESSION", "ASYM_ID_LIST"},
+     read_generator},
 };
 enum { CATEGORIES = sizeof categories / sizeof categories[0], NONE = -1, IGNORED = -2 };
 
@@ -246,7 +256,7 @@ static void read_number(const ov_cif *cif, ov_site *site) {
     const value *v = &cif->row[column];
     ov_number number;
     const char last = v->length ? text_of(cif, column)[v->length - 1] : '\0';
-    if (ov_letter(last) && v->length < 11 &&
+    if (ov_letter(last) && v->length > 1 && v->length < 11 &&
         ov_number_parse(text_of(cif, column), v->length - 1, &number) == v->length - 1 &&
         !number.point) {
         site->number = (int32_t)number.value;
@@ -347,6 +357,34 @@ static ovoid_status read_entity(ov_reader *reader, const ov_line *line) {
                      : ov_begins_with(type, length, "WATER") ? OV_ENTITY_WATER
                                                              : OV_ENTITY_OTHER;
     return OVOID_OK;
+}
+
+/* ---- assemblies ------------------------------------------------------------------------------ */
+
+/* An operator that lacks a number is left out: an assembly that needs it will say so. */
+static ovoid_status read_operator(ov_reader *reader, const ov_line *line) {
+    const ov_cif *cif = reader->cif;
+    ov_operator made = {{0}, {0}, {0}};
+    ov_field field;
+    (void)line;
+    if (!given(cif, 0) ||
+        !ov_site_text(made.id, sizeof made.id, text_of(cif, 0), cif->row[0].length))
+        return OVOID_OK;
+    for (int k = 0; k < 12; k++) {
+        if (!parse_real(cif, 1 + k, &field))
+            return OVOID_OK;
+        *(k < 9 ? &made.rotation[k] : &made.translation[k - 9]) = field.number.value;
+    }
+    return ov_assembly_add_operator(reader->context, &reader->assemblies, &made);
+}
+
+static ovoid_status read_generator(ov_reader *reader, const ov_line *line) {
+    const ov_cif *cif = reader->cif;
+    (void)line;
+    if (!given(cif, 0) || !given(cif, 1) || !given(cif, 2))
+        return OVOID_OK;
+    return ov_assembly_add_generator(reader->context, &reader->assemblies, text_of(cif, 0),
+                                     text_of(cif, 2), text_of(cif, 1));
 }
 
 /* ---- rows ------------------------------------------------------------------------------------ */
@@ -496,6 +534,8 @@ static ovoid_status take(ov_reader *reader, const ov_line *line, const token *t,
         cif->blocks++;
         cif->done = reader->sites.model_any;
         cif->entity_count = 0;
+        if (!cif->done)
+            ov_assembly_source_destroy(&reader->assemblies);
     }
 cleanup:
     return status;

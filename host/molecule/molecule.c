@@ -160,6 +160,7 @@ static ovoid_status read_again(ov_reader *reader, ahead *kept) {
     m->atoms = m->residue_count = 0;
     m->counts = (ovoid_molecule_counts){.lines = m->counts.lines};
     ov_sites_destroy(&reader->sites);
+    ov_assembly_source_destroy(&reader->assemblies);
     reader->unknown_lines = 0;
     for (size_t i = 0; i < kept->count && status == OVOID_OK; i++) {
         kept->lines[i].text = kept->text + kept->offsets[i];
@@ -365,7 +366,8 @@ static void warn_of_ignored(const ov_reader *reader) {
 static ovoid_status check_xyzr(const ov_reader *reader) {
     const ovoid_read_options *o = reader->options;
     const bool radii = o->radii != OVOID_RADII_DEFAULT && o->radii != OVOID_RADII_OWN;
-    const char *what = o->select         ? "a selection"
+    const char *what = o->assembly       ? "an assembly"
+                       : o->select       ? "a selection"
                        : o->no_hydrogens ? "leaving out hydrogens"
                        : radii           ? "other radii"
                        : o->model > 1    ? "a model's number"
@@ -394,7 +396,8 @@ static ovoid_status read_text(ov_reader *reader, ovoid_molecule_format format) {
         return no_atoms(reader, format);
     reader->molecule->format = format;
     warn_of_ignored(reader);
-    return ov_radii_assign(reader);
+    status = ov_assembly_finish(reader);
+    return status == OVOID_OK ? ov_radii_assign(reader) : status;
 }
 
 static void *trimmed(void *array, size_t count, size_t size) {
@@ -465,12 +468,14 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
     OV_TRY(ov_text_open(context, path, &reader.text));
     OV_TRY(read_text(&reader, reader.guess ? format_by_name(path) : options.format));
     trim(reader.molecule);
-    reader.molecule->counts.atoms = reader.molecule->atoms;
+    reader.molecule->counts.atoms = ovoid_molecule_atoms(reader.molecule);
+    reader.molecule->counts.unit_atoms = reader.molecule->atoms;
     *molecule = reader.molecule;
     reader.molecule = NULL;
 cleanup:
     ov_cif_destroy(&reader.cif);
     ov_sites_destroy(&reader.sites);
+    ov_assembly_source_destroy(&reader.assemblies);
     ov_text_close(&reader.text);
     ovoid_molecule_destroy(&reader.molecule);
     return status;
@@ -515,6 +520,7 @@ ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, s
     memcpy(made->xyzr, xyzr, atoms * 4 * sizeof *xyzr);
     made->atoms = atoms;
     made->counts.atoms = atoms;
+    made->counts.unit_atoms = atoms;
     made->counts.zero_radius = zeros;
     made->counts.models = 1;
     made->radii = OVOID_RADII_OWN;
@@ -530,16 +536,83 @@ void ovoid_molecule_destroy(ovoid_molecule **molecule) {
     free((*molecule)->identity);
     free((*molecule)->residues);
     free((*molecule)->guesses);
+    for (size_t i = 0; i < (*molecule)->part_count; i++)
+        free((*molecule)->parts[i].index);
+    free((*molecule)->parts);
+    free((*molecule)->assemblies);
+    free((*molecule)->placements);
+    free((*molecule)->all_xyzr);
     free(*molecule);
     *molecule = NULL;
 }
 
 size_t ovoid_molecule_atoms(const ovoid_molecule *molecule) {
-    return molecule ? molecule->atoms : 0;
+    if (!molecule)
+        return 0;
+    return molecule->placement_count ? molecule->all_atoms : molecule->atoms;
 }
 
 const double *ovoid_molecule_xyzr(const ovoid_molecule *molecule) {
+    if (!molecule)
+        return NULL;
+    if (molecule->placement_count == 0)
+        return molecule->xyzr;
+    return ov_molecule_expand(NULL, molecule) == OVOID_OK ? molecule->all_xyzr : NULL;
+}
+
+ovoid_status ovoid_molecule_expand(ovoid_context *context, const ovoid_molecule *molecule) {
+    return molecule
+               ? ov_molecule_expand(context, molecule)
+               : ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_expand: molecule is NULL");
+}
+
+size_t ovoid_molecule_unit_atoms(const ovoid_molecule *molecule) {
+    return molecule ? molecule->atoms : 0;
+}
+
+const double *ovoid_molecule_unit_xyzr(const ovoid_molecule *molecule) {
     return molecule ? molecule->xyzr : NULL;
+}
+
+const ovoid_assembly_info *ovoid_molecule_assemblies(const ovoid_molecule *molecule,
+                                                     size_t *count) {
+    if (count)
+        *count = molecule ? molecule->assembly_count : 0;
+    return molecule ? molecule->assemblies : NULL;
+}
+
+const ovoid_placement *ovoid_molecule_placements(const ovoid_molecule *molecule, size_t *count) {
+    if (count)
+        *count = molecule ? molecule->placement_count : 0;
+    return molecule ? molecule->placements : NULL;
+}
+
+const uint32_t *ovoid_molecule_part(const ovoid_molecule *molecule, uint32_t part, size_t *count) {
+    const bool known = molecule && part < molecule->part_count;
+    if (count)
+        *count = known ? molecule->parts[part].atoms : 0;
+    return known ? molecule->parts[part].index : NULL;
+}
+
+size_t ovoid_molecule_origin(const ovoid_molecule *molecule, size_t atom, size_t *placement) {
+    if (placement)
+        *placement = 0;
+    if (!molecule || molecule->placement_count == 0)
+        return atom;
+    size_t low = 0, high = molecule->placement_count; /* the last that begins at `atom` or before */
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (molecule->placements[middle].first <= atom)
+            low = middle;
+        else
+            high = middle;
+    }
+    const ovoid_placement *p = &molecule->placements[low];
+    const ov_part *part = &molecule->parts[p->part];
+    const size_t within = atom - (size_t)p->first;
+    if (placement)
+        *placement = low;
+    return part->index && within < part->atoms ? part->index[within] : within;
 }
 
 ovoid_molecule_counts ovoid_molecule_read_counts(const ovoid_molecule *molecule) {

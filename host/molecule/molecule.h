@@ -13,6 +13,12 @@
 
 enum { OV_GUESSES_MAX = 64 };
 
+/* Atoms of the unit that some placements take. */
+typedef struct ov_part {
+    uint32_t *index; /* atoms of them, ascending; NULL: the whole unit */
+    size_t atoms;
+} ov_part;
+
 struct ovoid_molecule {
     double *xyzr; /* 4 * atoms, owned */
     size_t atoms;
@@ -25,6 +31,17 @@ struct ovoid_molecule {
     int32_t model;
     ovoid_guess *guesses;
     size_t guess_count;
+
+    /* Assemblies: those of the file, and the placements of the atoms above in the one that this
+     * molecule is. */
+    ovoid_assembly_info *assemblies;
+    size_t assembly_count;
+    ovoid_placement *placements; /* NULL: this is no assembly */
+    size_t placement_count;
+    ov_part *parts;
+    size_t part_count;
+    size_t all_atoms;
+    double *all_xyzr; /* 4 * all_atoms, made when first asked for */
 };
 
 #endif

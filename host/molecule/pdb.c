@@ -54,14 +54,15 @@ static int64_t base36(const char *text, size_t width) {
     return value;
 }
 
-/* Hybrid-36: decimal numbers as far as they go, then A000.., then a000... */
+/* Decimal, and in columns of 4 and 5 hybrid-36: numbers as far as they go, then A000.., then
+ * a000... */
 static bool parse_integer(piece p, size_t width, int32_t *number) {
     int64_t power10 = 1, power36 = 1;
-    for (size_t i = 0; i < width; i++)
+    for (size_t i = 0; i < width && width <= 5; i++)
         power10 *= 10;
-    for (size_t i = 0; i + 1 < width; i++)
+    for (size_t i = 0; i + 1 < width && width <= 5; i++)
         power36 *= 36;
-    if (p.length == width && ov_letter(*p.text)) {
+    if (width <= 5 && p.length == width && ov_letter(*p.text)) {
         const int64_t value = base36(p.text, width);
         const bool lower = *p.text >= 'a';
         if (value < 0)
@@ -227,6 +228,8 @@ ovoid_status ov_pdb_line(ov_reader *reader, const ov_line *line) {
     else if (ov_pdb_misses(line))
         return ov_text_fail(reader->text, line, text,
                             "an atom whose record is not in the columns of a PDB file");
+    else if (ov_begins_with(text, line->length, "REMARK"))
+        return ov_assembly_remark(reader->context, &reader->assemblies, reader->text, line);
     else
         ov_pdb_follow_models(reader, text, line->length);
     return OVOID_OK;

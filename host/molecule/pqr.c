@@ -310,20 +310,22 @@ static void suspect_pdb(ov_pdb_suspicion *pdb, const ov_line *line, const ov_fie
         pdb->cleared = true;
         return;
     }
+    pdb->atoms++;
     pdb->ones += occupancy == 1;
     pdb->element += line->length >= 78 && ov_letter(line->text[77]);
     if (radius->number.value > pdb->largest)
         pdb->largest = radius->number.value;
 }
 
-/* Most occupancies are 1.00; besides, something must be there that PQR files do not have: header
- * records, elements, or temperature factors no radius could be. */
+/* Something must be there that PQR files do not have: header records, elements, or temperature
+ * factors no radius could be. One of these is enough where most occupancies are 1.00. */
 bool ov_pqr_is_pdb(const ov_reader *reader) {
     const ov_pdb_suspicion *pdb = &reader->pdb;
     const double largest_radius = 5; /* angstrom; the largest atom has 3.5 */
-    size_t atoms = reader->molecule->atoms;
-    return !pdb->cleared && atoms > 1 && pdb->ones >= atoms - atoms / 4 &&
-           (pdb->header || pdb->element == atoms || pdb->largest > largest_radius);
+    const uint64_t atoms = pdb->atoms;
+    const bool full = pdb->ones >= atoms - atoms / 4;
+    const int signs = pdb->header + (pdb->element >= atoms) + (pdb->largest > largest_radius);
+    return !pdb->cleared && atoms > 1 && (full ? signs > 0 : signs > 1);
 }
 
 static ovoid_status fail_as_pdb(const ov_reader *reader) {
@@ -470,7 +472,7 @@ ovoid_status ov_pqr_line(ov_reader *reader, const ov_line *line) {
         return OVOID_OK;
     if (is_record(text, length, other_records)) {
         ov_pdb_follow_models(reader, text, length);
-        return OVOID_OK;
+        return ov_assembly_remark(reader->context, &reader->assemblies, reader->text, line);
     }
     if (is_record(text, length, pdb_records)) {
         reader->pdb.header = true;

@@ -106,7 +106,8 @@ static ovoid_status read_line(ovoid_context *context, ov_radii_table *table, ov_
 
 /* Sorts the rows; two for one atom are an error. */
 static ovoid_status complete(ovoid_context *context, ov_radii_table *table, const char *path) {
-    qsort(table->rows, table->count, sizeof(row), by_name);
+    if (table->count)
+        qsort(table->rows, table->count, sizeof(row), by_name);
     for (size_t i = 1; i < table->count; i++) {
         const row *a = &table->rows[i - 1], *b = &table->rows[i];
         if (by_name(a, b) != 0)

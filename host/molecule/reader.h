@@ -5,6 +5,7 @@
 #ifndef OV_MOLECULE_READER_H
 #define OV_MOLECULE_READER_H
 
+#include "molecule/assembly.h"
 #include "molecule/fields.h"
 #include "molecule/molecule.h"
 #include "molecule/sites.h"
@@ -14,6 +15,7 @@
 typedef struct ov_pdb_suspicion {
     bool cleared;     /* some atom cannot have come from a PDB file */
     bool header;      /* records that PDB files have and PQR files hardly ever */
+    uint64_t atoms;   /* seen */
     uint64_t ones;    /* atoms whose occupancy would be 1.00 */
     uint64_t element; /* atoms with an element in the PDB columns */
     double largest;   /* temperature factor */
@@ -42,6 +44,8 @@ typedef struct ov_reader {
     bool announced; /* the file began with a count line */
     uint64_t announced_line;
     double announced_atoms;
+
+    ov_assembly_source assemblies;
 
     struct ov_cif *cif; /* cif.c */
 } ov_reader;

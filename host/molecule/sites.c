@@ -368,7 +368,8 @@ static ovoid_status resolve_altlocs(ov_reader *reader, unsigned char *keep) {
             one->atom = (uint32_t)i;
             memcpy(one->chain, residue->chain, sizeof one->chain);
         }
-    qsort(atoms, count, sizeof *atoms, by_residue_and_atom);
+    if (count)
+        qsort(atoms, count, sizeof *atoms, by_residue_and_atom);
     for (size_t begin = 0, end; begin < count; begin = end) {
         end = begin + 1;
         while (end < count && by_residue(&atoms[begin], &atoms[end]) == 0)
@@ -383,7 +384,7 @@ static ovoid_status resolve_altlocs(ov_reader *reader, unsigned char *keep) {
 /* ---- the end -------------------------------------------------------------------------------- */
 
 /* Moves what stays together. Residues without atoms go. */
-static void compact(ov_reader *reader, const unsigned char *keep) {
+void ov_sites_compact(ov_reader *reader, const unsigned char *keep) {
     ovoid_molecule *m = reader->molecule;
     ov_sites *sites = &reader->sites;
     size_t atoms = 0, residues = 0;
@@ -420,7 +421,7 @@ static ovoid_status decide(ov_reader *reader) {
         OV_TRY(select_atoms(reader, keep));
     if (reader->sites.altlocs)
         OV_TRY(resolve_altlocs(reader, keep));
-    compact(reader, keep);
+    ov_sites_compact(reader, keep);
 cleanup:
     free(keep);
     return status;

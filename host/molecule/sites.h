@@ -79,6 +79,9 @@ void ov_sites_ter(struct ov_reader *reader);
 /* OVOID_ERROR_ARGUMENT where the selection makes no sense; NULL is none. */
 ovoid_status ov_selection_check(ovoid_context *context, const char *text);
 
+/* Leaves out the atoms of which keep is 0, and residues without atoms. */
+void ov_sites_compact(struct ov_reader *reader, const unsigned char *keep);
+
 /* Selects, resolves alternate locations, and counts. There may be no atom left. */
 ovoid_status ov_sites_finish(struct ov_reader *reader);
 

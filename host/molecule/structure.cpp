@@ -34,8 +34,10 @@ const char *ov_element_name(int element) {
 /* The kinds of residue of which gemmi holds a table; names are short, so no string is allocated and
  * nothing can be thrown. */
 static gemmi::ResidueInfo::Kind kind_of(const char *name) {
-    if (std::strlen(name) > 7)
-        return gemmi::ResidueInfo::UNKNOWN;
+    const size_t length = std::strlen(name);
+    for (size_t i = 0; i < length; i++)
+        if (i > 6 || static_cast<unsigned char>(name[i]) > 0x7e) /* gemmi shifts its bytes */
+            return gemmi::ResidueInfo::UNKNOWN;
     return gemmi::find_tabulated_residue(name).kind;
 }
 

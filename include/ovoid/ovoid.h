@@ -177,6 +177,8 @@ typedef struct ovoid_read_options {
     int32_t model;          /* its number in the file; 0: the first */
     bool waters;            /* keep those of PDB and mmCIF files (those of PQR stay in any case) */
     bool no_hydrogens;      /* leave out hydrogen and deuterium */
+    const char *assembly;   /* make the molecule this assembly of the file (see below); NULL: the
+                               atoms as they are there */
 } ovoid_read_options;
 
 /* Fills in the defaults. size is that of *options: sizeof(ovoid_read_options). */
@@ -186,6 +188,7 @@ OVOID_API void ovoid_read_options_init(ovoid_read_options *options, size_t size)
 typedef struct ovoid_molecule_counts {
     uint64_t lines;             /* lines read */
     uint64_t atoms;             /* atoms in the molecule */
+    uint64_t unit_atoms;        /* of the file that are in it: as many, unless it is an assembly */
     uint64_t zero_radius;       /* of these, with radius 0 */
     uint64_t hydrogens;         /* of these, hydrogen or deuterium; 0 where elements are unknown */
     uint64_t zero_occupancy;    /* of these, with occupancy 0 */
@@ -196,6 +199,7 @@ typedef struct ovoid_molecule_counts {
     uint64_t skipped_waters;    /* ... of waters */
     uint64_t skipped_hydrogens; /* ... hydrogens, by no_hydrogens */
     uint64_t skipped_selection; /* ... not selected */
+    uint64_t skipped_assembly;  /* ... of chains that are not in the assembly */
     uint64_t skipped_altlocs;   /* ... at other alternate locations than the chosen ones */
 } ovoid_molecule_counts;
 
@@ -222,7 +226,9 @@ OVOID_API void ovoid_molecule_destroy(ovoid_molecule **molecule);
 
 OVOID_API size_t ovoid_molecule_atoms(const ovoid_molecule *molecule);
 
-/* x, y, z, radius of all atoms, 4 * atoms values, in the order of the file. */
+/* x, y, z, radius of all atoms, 4 * atoms values, in the order of the file; of an assembly
+ * placement after placement. Those of an assembly are computed when first asked for: NULL where
+ * there is no memory for them. */
 OVOID_API const double *ovoid_molecule_xyzr(const ovoid_molecule *molecule);
 
 OVOID_API ovoid_molecule_counts ovoid_molecule_read_counts(const ovoid_molecule *molecule);
@@ -269,12 +275,13 @@ typedef struct ovoid_residue { /* 32 bytes */
     uint32_t first; /* its first atom; it ends where the next residue begins */
 } ovoid_residue;
 
-/* One entry per atom, in the order of ovoid_molecule_xyzr(). NULL where the file says nothing of
- * its atoms but place and radius: XYZR, and molecules from memory. */
+/* One entry per atom, in the order of ovoid_molecule_xyzr(); of an assembly one per atom of the
+ * unit, see ovoid_molecule_origin(). NULL where the file says nothing of its atoms but place and
+ * radius: XYZR, and molecules from memory. */
 OVOID_API const ovoid_atom *ovoid_molecule_identity(const ovoid_molecule *molecule);
 
-/* Residues in the order of their atoms, *count of them; one whose atoms are not together is there
- * more than once. NULL and 0 where there is no identity. */
+/* Residues in the order of their atoms (of the unit), *count of them; one whose atoms are not
+ * together is there more than once. NULL and 0 where there is no identity. */
 OVOID_API const ovoid_residue *ovoid_molecule_residues(const ovoid_molecule *molecule,
                                                        size_t *count);
 
@@ -288,6 +295,56 @@ typedef struct ovoid_guess {
 
 /* The kinds, *count of them, the first 64 at most; counts.guessed_radii has all atoms. */
 OVOID_API const ovoid_guess *ovoid_molecule_guesses(const ovoid_molecule *molecule, size_t *count);
+
+/* ---- assemblies ----------------------------------------------------------------------------- */
+
+/*
+ * An assembly is a unit, the atoms of the file that take part in it, and its placements: for each,
+ * a rotation and a translation of a part of the unit. Most have one part, which is the whole unit;
+ * those that do different things with different chains have several. Files describe them in
+ * _pdbx_struct_assembly_gen (mmCIF) or REMARK 350 (PDB, and PQR files that kept it).
+ */
+
+typedef struct ovoid_assembly_info {
+    char id[16];         /* "1" */
+    uint64_t placements; /* of all its parts */
+    uint64_t atoms;      /* that it would have, of the atoms that were read; UINT64_MAX: too many */
+} ovoid_assembly_info;
+
+/* The assemblies that the file describes, *count of them; NULL and 0 for none. */
+OVOID_API const ovoid_assembly_info *ovoid_molecule_assemblies(const ovoid_molecule *molecule,
+                                                               size_t *count);
+
+typedef struct ovoid_placement { /* 112 bytes */
+    double rotation[9];          /* row by row: x' = rotation x + translation */
+    double translation[3];       /* angstrom */
+    uint32_t part;               /* which atoms, see ovoid_molecule_part() */
+    uint32_t reserved;
+    uint64_t first; /* index of its first atom among all */
+} ovoid_placement;
+
+/* The placements of a molecule that was read as an assembly, *count of them; NULL and 0 of one that
+ * was not. */
+OVOID_API const ovoid_placement *ovoid_molecule_placements(const ovoid_molecule *molecule,
+                                                           size_t *count);
+
+/* The atoms of the unit that belong to a part, ascending, *count of them; NULL with a *count above
+ * 0: all. */
+OVOID_API const uint32_t *ovoid_molecule_part(const ovoid_molecule *molecule, uint32_t part,
+                                              size_t *count);
+
+/* The unit: its atoms as the file has them. Of a molecule that is no assembly, all of it. */
+OVOID_API size_t ovoid_molecule_unit_atoms(const ovoid_molecule *molecule);
+OVOID_API const double *ovoid_molecule_unit_xyzr(const ovoid_molecule *molecule);
+
+/* Which atom of the unit this one of all atoms is, and in which placement (NULL: not asked). */
+OVOID_API size_t ovoid_molecule_origin(const ovoid_molecule *molecule, size_t atom,
+                                       size_t *placement);
+
+/* Computes all atoms of an assembly now, and says so if there is no memory for them: 32 bytes for
+ * each. What works on all atoms does it by itself. */
+OVOID_API ovoid_status ovoid_molecule_expand(ovoid_context *context,
+                                             const ovoid_molecule *molecule);
 
 /* ---- output files -------------------------------------------------------------------------- */
 

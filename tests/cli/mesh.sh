@@ -9,7 +9,8 @@ expect_code 0
 run "$OVOID" mesh ../a.xyzr
 expect_code 0
 expect_silent
-expect_out "molecule  ../a.xyzr: 12 atoms, decay 0.5 Å⁻²"
+expect_out "molecule  ../a.xyzr: 12 atoms"
+expect_out "field     decay 0.5 Å⁻²"
 expect_out "surface   isovalue 1: 1 piece, 1 of them outer"
 expect_out "spacing 0.5 Å, exact vertices"
 expect_out "mesh      written to a.ply"

@@ -194,3 +194,37 @@ void expect_near(double got, double wanted, double tolerance, const char *what) 
         fail_msg("%s is %.12g instead of %.12g, off by %.3g where %.3g is allowed", what, got,
                  wanted, fabs(got - wanted), tolerance);
 }
+
+/* How many ellipsoids have a larger value at the point than this one. */
+static size_t rank_at(const ov_quadric *quadrics, size_t count, uint32_t of, const double at[3]) {
+    const double own = ov_quadric_log_value(&quadrics[of], at);
+    size_t rank = 0;
+    for (size_t i = 0; i < count; ++i)
+        rank += ov_quadric_log_value(&quadrics[i], at) > own;
+    return rank;
+}
+
+size_t expect_owners(const ovoid_molecule *molecule, const ovoid_model *model, size_t among,
+                     double most) {
+    const size_t atoms = ovoid_molecule_atoms(molecule), count = ovoid_model_size(model);
+    const uint32_t *const owner = ovoid_model_owner(model);
+    ov_quadric *const quadrics = test_alloc(count, sizeof *quadrics);
+    bool *const owns = test_alloc(count, sizeof *owns);
+    size_t near = 0, idle = 0;
+    assert_int_equal(ovoid_model_owner_count(model), atoms);
+    for (size_t i = 0; i < count; ++i)
+        ov_quadric_of_ellipsoid(&ovoid_model_ellipsoids(model)[i], &quadrics[i]);
+    for (size_t i = 0; i < atoms; ++i) {
+        assert_true(owner[i] < count);
+        owns[owner[i]] = true;
+        near += rank_at(quadrics, count, owner[i], ovoid_molecule_xyzr(molecule) + 4 * i) < among;
+    }
+    for (size_t i = 0; i < count; ++i)
+        idle += !owns[i];
+    print_message("%zu of %zu atoms near their owners, %zu of %zu ellipsoids without an atom\n",
+                  near, atoms, idle, count);
+    assert_true((double)near >= most * (double)atoms);
+    free(quadrics);
+    free(owns);
+    return idle;
+}

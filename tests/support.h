@@ -116,6 +116,12 @@ void write_floats(ovoid_context *context, ov_buffer *buffer, const float *values
 void expect_close(double got, reference_sum wanted, double tolerance, double *worst,
                   const char *what, size_t index);
 
+/* Fails unless each atom of the molecule has an owner among the model's ellipsoids, and of the
+ * share `most` of the atoms the owner has one of the `among` largest values at the atom's centre.
+ * Returns how many ellipsoids own no atom. */
+size_t expect_owners(const ovoid_molecule *molecule, const ovoid_model *model, size_t among,
+                     double most);
+
 /* Fails unless |got - wanted| <= tolerance. */
 void expect_near(double got, double wanted, double tolerance, const char *what);
 

@@ -70,6 +70,8 @@ static void run_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     options->user = &run->trace;
     test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
     test_check(context, ovoid_fit(context, molecule, options, &run->model, &run->result));
+    /* An atom keeps its own ellipsoid as long as there is one: none is left without an atom. */
+    assert_int_equal(expect_owners(molecule, run->model, 3, 0.8), 0);
     ovoid_molecule_destroy(&molecule);
 }
 
@@ -414,6 +416,9 @@ static void pruning_takes_what_is_below(void **state) {
         expect_near(e[i].centre[0], 6.0 * (double)i, 0.3, "the centre of one that stays");
         assert_true(e[i].amplitude > 2.0);
     }
+    /* The two that went are nearest to that of the largest radius. */
+    const uint32_t owner[5] = {0, 1, 1, 1, 2};
+    assert_memory_equal(ovoid_model_owner(run.model), owner, sizeof owner);
     destroy_run(&run);
 }
 

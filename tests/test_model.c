@@ -52,12 +52,16 @@ static void create_copies(void **state) {
     assert_true(ovoid_model_decay(model) == 0.3);
     assert_true(ovoid_model_isovalue(model) == 2.0);
     assert_null(ovoid_model_note(model, 0));
+    assert_null(ovoid_model_owner(model)); /* only a fit knows */
+    assert_int_equal(ovoid_model_owner_count(model), 0);
     ovoid_model_destroy(&model);
     assert_null(model);
     ovoid_model_destroy(&model);
     ovoid_model_destroy(NULL);
     assert_int_equal(ovoid_model_size(NULL), 0);
     assert_null(ovoid_model_ellipsoids(NULL));
+    assert_null(ovoid_model_owner(NULL));
+    assert_int_equal(ovoid_model_owner_count(NULL), 0);
     assert_null(ovoid_model_note(NULL, 0));
 }
 

@@ -20,7 +20,9 @@ enum {
     CLI_OUTPUT = 4,   /* an output cannot be written */
     CLI_DEVICE = 5,   /* no OpenCL device, or none that matches */
     CLI_COMPUTE = 6,  /* out of memory, over a limit, or numbers that are not finite */
-    CLI_GOAL = 7      /* all went well, but what a fit reached is not what was asked */
+    CLI_GOAL = 7,     /* all went well, but what a fit reached is not what was asked */
+    CLI_SOME = 8,     /* of several inputs some failed */
+    CLI_NONE = 9      /* all of them did, not all for the same reason */
 };
 
 /* ---- main.c: messages ----------------------------------------------------------------------- */
@@ -36,6 +38,12 @@ __attribute__((format(printf, 1, 2)))
 #endif
 void
 cli_warning(const char *format, ...);
+
+/* From now on errors and warnings that do not name `about` begin with it; NULL: with nothing. The
+ * text must live until replaced. Forgets the last error. */
+void cli_message_subject(const char *about);
+/* The text of the last error since then, "" for none. Valid until the next. */
+const char *cli_last_error(void);
 
 /* An ovoid_warning_fn; user is a bool: quiet. */
 void cli_on_warning(const char *text, void *quiet);

@@ -20,7 +20,7 @@ static FILE *choose_summary(const fit_job *job) {
     if (job->quiet)
         return NULL;
     bool taken = goes_to_standard_output(job->output) || goes_to_standard_output(job->report) ||
-                 goes_to_standard_output(job->trace);
+                 goes_to_standard_output(job->trace) || goes_to_standard_output(job->owners);
     return taken ? stderr : stdout;
 }
 
@@ -28,8 +28,11 @@ static FILE *choose_summary(const fit_job *job) {
 static ovoid_status check_outputs(const fit_job *job) {
     const char *const paths[] = {job->report, job->trace};
     ovoid_status status = OVOID_OK;
-    for (size_t i = 0; i < job->level_count && status == OVOID_OK; i++)
+    for (size_t i = 0; i < job->level_count && status == OVOID_OK; i++) {
         status = ovoid_file_check(job->context, job->levels[i].path);
+        if (status == OVOID_OK && job->levels[i].owners)
+            status = ovoid_file_check(job->context, job->levels[i].owners);
+    }
     for (size_t i = 0; i < sizeof paths / sizeof *paths && status == OVOID_OK; i++)
         status = paths[i] ? ovoid_file_check(job->context, paths[i]) : OVOID_OK;
     return status;
@@ -56,91 +59,6 @@ const char *fit_distance(double distance, double above, char text[FIT_DISTANCE_T
             break;
     }
     return text;
-}
-
-/* ---- the model's header --------------------------------------------------------------------- */
-
-/* Adds a header line to the model. Line breaks and the like, which a file name may hold, become
- * '?'. */
-static ovoid_status annotate(const fit_job *job, ovoid_model *model, const char *key,
-                             const char *text) {
-    char *clean = strdup(text);
-    if (!clean)
-        return OVOID_ERROR_MEMORY;
-    for (char *c = clean; *c; c++)
-        if ((unsigned char)*c < 0x20 || *c == 0x7f)
-            *c = '?';
-    ovoid_status status = ovoid_model_annotate(job->context, model, key, clean);
-    free(clean);
-    return status;
-}
-
-/* ", name value" of each, as far as there is room. */
-static size_t append_numbers(const cli_number *numbers, size_t count,
-                             const ovoid_fit_options *options, char *text, size_t size,
-                             size_t used) {
-    for (size_t i = 0; i < count && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, ", %s %.9g", numbers[i].name,
-                                 cli_number_value(&numbers[i], options));
-    return used;
-}
-
-static void print_settings(const fit_job *job, char *text, size_t size) {
-    const ovoid_fit_options *options = &job->options;
-    size_t used = (size_t)snprintf(text, size, "method %s, spacing %.9g, padding %.9g",
-                                   fit_method_name(options->method), job->levels[0].result.spacing,
-                                   options->padding);
-    if (options->method == OVOID_METHOD_ADAPTIVE) {
-        used =
-            append_numbers(&fit_goal_numbers[options->adaptive.goal], 1, options, text, size, used);
-        used = append_numbers(fit_adaptive_numbers, fit_adaptive_count, options, text, size, used);
-        if (used < size)
-            snprintf(text + used, size - used, ", mesh-spacing %.9g",
-                     options->adaptive.mesh_spacing);
-        return;
-    }
-    used = append_numbers(fit_l1_numbers, fit_l1_count, options, text, size, used);
-    if (used < size)
-        snprintf(text + used, size - used, ", kernel %s, first-step %s",
-                 fit_kernel_name(options->l1.kernel), fit_first_step_name(options->l1.first_step));
-}
-
-/* What method adaptive reached. */
-static ovoid_status annotate_result(const fit_job *job, size_t level, ovoid_model *model) {
-    const ovoid_fit_result *result = &job->levels[level].result;
-    const double tolerance = job->options.adaptive.tolerance;
-    char text[64], digits[FIT_DISTANCE_TEXT];
-    ovoid_status status = OVOID_OK;
-    if (job->level_count > 1) {
-        snprintf(text, sizeof text, "%zu of %zu", level + 1, job->levels_done);
-        status = annotate(job, model, "level", text);
-    }
-    if (status == OVOID_OK && level == 0)
-        status = annotate(job, model, "goal", result->reached ? "reached" : "not reached");
-    if (status == OVOID_OK && isfinite(result->distance))
-        status =
-            annotate(job, model, "distance", fit_distance(result->distance, tolerance, digits));
-    return status;
-}
-
-/* The model file says where it comes from. */
-static ovoid_status annotate_all(const fit_job *job, size_t level) {
-    const ovoid_device_info *device = ovoid_context_device(job->context);
-    ovoid_model *model = job->levels[level].model;
-    char text[1024];
-    snprintf(text, sizeof text, "ovoid %s", ovoid_version());
-    ovoid_status status = annotate(job, model, "program", text);
-    if (status != OVOID_OK || (status = annotate(job, model, "input", job->input)) != OVOID_OK)
-        return status;
-    snprintf(text, sizeof text, "%s (%s, driver %s)", device->name, device->platform,
-             device->driver);
-    if ((status = annotate(job, model, "device", text)) != OVOID_OK)
-        return status;
-    print_settings(job, text, sizeof text);
-    status = annotate(job, model, "settings", text);
-    if (status == OVOID_OK && job->options.method == OVOID_METHOD_ADAPTIVE)
-        status = annotate_result(job, level, model);
-    return status;
 }
 
 /* ---- the run -------------------------------------------------------------------------------- */
@@ -186,10 +104,12 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
 }
 
 static ovoid_status fit_one(fit_job *job, size_t level) {
-    char label[64];
-    snprintf(label, sizeof label, "level %zu/%u", level + 1, (unsigned)job->level_count);
+    const char *begin = job->label ? job->label : "", *between = job->label ? "  " : "";
+    char label[128];
+    snprintf(label, sizeof label, "%s%slevel %zu/%u", begin, between, level + 1,
+             (unsigned)job->level_count);
     fit_trace_level(&job->tracer, level);
-    cli_progress_start(job->quiet, job->level_count > 1 ? label : NULL);
+    cli_progress_start(job->quiet, job->level_count > 1 ? label : job->label);
     ovoid_status status = fit_model(job, level);
     cli_progress_erase();
     if (status == OVOID_OK)
@@ -256,25 +176,38 @@ static int measure_all(fit_job *job) {
 static ovoid_status write_models(fit_job *job) {
     ovoid_status status = OVOID_OK;
     for (size_t i = 0; i < job->levels_done && status == OVOID_OK; i++) {
-        status = annotate_all(job, i);
+        status = fit_annotate(job, i);
         if (status == OVOID_OK)
             status = ovoid_model_write(job->context, job->levels[i].model, job->levels[i].path);
     }
     return status;
 }
 
-/* Writes the models, then the trace, then the report, which tells how long the others took. The
- * model is worth more than the others: their failure does not undo it. */
+static int write_owners(fit_job *job) {
+    for (size_t i = 0; job->owners && i < job->levels_done; i++) {
+        const ovoid_status status = fit_owners_write(job, &job->levels[i]);
+        if (status != OVOID_OK) {
+            job->owners_failed = true;
+            return cli_failure(job->context, status, CLI_OUTPUT);
+        }
+    }
+    return CLI_OK;
+}
+
+/* Writes the models, then the trace and the owners, then the report, which tells how long the
+ * others took. The model is worth more than the others: their failure does not undo it. */
 static int write_outputs(fit_job *job) {
     double begin = cli_seconds();
     cli_keep_signals();
     ovoid_status status = write_models(job);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
+    job->written = true;
     fit_trace_commit(&job->tracer);
+    const int owners = write_owners(job);
     job->write_seconds = cli_seconds() - begin;
     job->total_seconds = cli_seconds() - job->started;
-    int code = job->tracer.failed ? CLI_OUTPUT : CLI_OK;
+    int code = job->tracer.failed ? CLI_OUTPUT : owners;
     if (job->report && (status = fit_report_write(job)) != OVOID_OK) {
         code = cli_failure(job->context, status, CLI_OUTPUT);
         job->report_failed = true;
@@ -304,9 +237,16 @@ static int compare_with_goal(const fit_job *job) {
     return CLI_GOAL;
 }
 
-static int run(fit_job *job) {
-    if (reading_lists(&job->reading))
-        return reading_list(&job->reading, job->context, job->input);
+static ovoid_status run_fit(fit_job *job, int *levels, int *measured) {
+    fit_summary_before(job);
+    ovoid_status status = fit(job, levels);
+    if (status == OVOID_OK && !cli_interrupted())
+        *measured = measure_all(job);
+    return status == OVOID_OK && cli_interrupted() ? OVOID_ERROR_CANCELLED : status;
+}
+
+int fit_run(fit_job *job) {
+    int levels = CLI_OK, measured = CLI_OK;
     ovoid_status status = check_outputs(job);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
@@ -314,16 +254,9 @@ static int run(fit_job *job) {
         return cli_failure(job->context, status, CLI_INPUT);
     if (!check_goal(job))
         return CLI_USAGE;
-    if ((status = open_device(job)) != OVOID_OK)
+    if (!ovoid_context_device(job->context) && (status = open_device(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
-    fit_summary_before(job);
-    int levels = CLI_OK, measured = CLI_OK;
-    status = fit(job, &levels);
-    if (status == OVOID_OK && !cli_interrupted())
-        measured = measure_all(job);
-    if (status == OVOID_OK && cli_interrupted())
-        status = OVOID_ERROR_CANCELLED;
-    if (status != OVOID_OK)
+    if ((status = run_fit(job, &levels, &measured)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     const int written = write_outputs(job);
     if (written != CLI_OK || levels != CLI_OK || measured != CLI_OK)
@@ -331,27 +264,40 @@ static int run(fit_job *job) {
     return compare_with_goal(job);
 }
 
+void fit_job_destroy(fit_job *job) {
+    fit_trace_destroy(&job->tracer);
+    for (size_t i = 0; i < FIT_LEVELS_MAX; i++)
+        ovoid_model_destroy(&job->levels[i].model);
+    cli_profile_destroy(&job->profile);
+    ovoid_molecule_destroy(&job->molecule);
+    fit_outputs_destroy(job);
+}
+
+/* What assemblies there are in each of the files. */
+static int list_assemblies(const fit_job *job) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < job->input_count; i++) {
+        const int one = reading_list(&job->reading, job->context, job->inputs[i]);
+        code = code == CLI_OK ? one : code;
+    }
+    return code;
+}
+
+static int run(fit_job *job) {
+    if (reading_lists(&job->reading))
+        return list_assemblies(job);
+    return job->folder ? fit_batch(job) : fit_run(job);
+}
+
 int cli_fit(int argc, char **argv) {
     fit_job job = {.started = cli_seconds()};
     int code;
     if (fit_options_parse(argc, argv, &job, &code)) {
         job.summary = choose_summary(&job);
-        if (ovoid_context_create(&job.context) == OVOID_OK) {
-            ovoid_context_on_warning(job.context, cli_on_warning, &job.quiet);
+        if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);
-        } else {
-            cli_error("out of memory");
-            code = CLI_COMPUTE;
-        }
     }
-    fit_trace_destroy(&job.tracer);
-    for (size_t i = 0; i < FIT_LEVELS_MAX; i++) {
-        ovoid_model_destroy(&job.levels[i].model);
-        free(job.levels[i].own_path);
-    }
-    cli_profile_destroy(&job.profile);
-    ovoid_molecule_destroy(&job.molecule);
+    fit_job_destroy(&job);
     ovoid_context_destroy(&job.context);
-    free(job.default_output);
     return code;
 }

@@ -1,5 +1,5 @@
 /*
- * One run of `ovoid fit`, shared by the files that make it up.
+ * `ovoid fit`: the job of one molecule, and many of them; shared by the files that make it up.
  */
 #ifndef CLI_FIT_H
 #define CLI_FIT_H
@@ -22,8 +22,8 @@ enum { FIT_LEVELS_MAX = 32 };
 
 /* One of the models that a run makes: the goal's, then each with half the ellipsoids. */
 typedef struct fit_level {
-    const char *path;
-    char *own_path; /* path may point to it */
+    char *path;   /* of the model, owned */
+    char *owners; /* of the table of owners, owned; NULL: none */
     ovoid_model *model;
     ovoid_fit_result result;
     bool measured;
@@ -34,10 +34,15 @@ typedef struct fit_job {
     /* what was asked */
     const char *input;
     const char *output;
-    char *default_output; /* owned, output may point to it */
-    const char *report;   /* NULL: none */
-    const char *trace;    /* NULL: none */
-    const char *device;   /* NULL: the default */
+    const char *report;                        /* NULL: none */
+    const char *trace;                         /* NULL: none */
+    const char *owners;                        /* of the first level, NULL: none */
+    char *own_output, *own_trace, *own_owners; /* what these may point to */
+    const char *device;                        /* NULL: the default */
+    const char *folder;  /* NULL: one molecule; else of several, where all goes (see fit_batch.c) */
+    char *const *inputs; /* of several molecules */
+    size_t input_count;
+    const char *label; /* what a progress line begins with, NULL: nothing */
     bool quiet;
     reading reading;
     ovoid_fit_options options; /* with the method's spacing, never 0 */
@@ -53,7 +58,8 @@ typedef struct fit_job {
     fit_level levels[FIT_LEVELS_MAX]; /* all have their paths from the start */
     size_t levels_done; /* have their models; fewer than asked for where halving ends */
     fit_trace tracer;
-    bool report_failed;
+    bool written; /* the models are */
+    bool report_failed, owners_failed;
     double started, device_seconds, read_seconds, measure_seconds, write_seconds, total_seconds;
 } fit_job;
 
@@ -75,7 +81,24 @@ extern const size_t fit_surface_count, fit_goal_count, fit_adaptive_count, fit_l
 /* And of other structures: fit_job.level_count and ovoid_measure_options.spacing. */
 extern const cli_number fit_levels_number, fit_mesh_spacing_number;
 
+/* ---- fit_outputs.c --------------------------------------------------------------------------- */
+
+/* Names every level's files. False: it cannot be, all said. */
+bool fit_outputs_name(fit_job *job);
+/* The same in job->folder: output, trace and owners are called as the molecule, and there what was
+ * asked for as trace and owners is the ending. */
+bool fit_outputs_name_in_folder(fit_job *job);
+/* Whether no file would be written twice or over the molecule; says so if not. */
+bool fit_outputs_check(const fit_job *job);
+void fit_outputs_destroy(fit_job *job);
+
 /* ---- fit.c ----------------------------------------------------------------------------------- */
+
+/* One molecule from its file to its model; returns the exit code, all said. The context is there,
+ * the device may be open already. */
+int fit_run(fit_job *job);
+/* Frees what the run has made, and the outputs' names. */
+void fit_job_destroy(fit_job *job);
 
 /* Of all levels. */
 double fit_sample_seconds(const fit_job *job);
@@ -84,6 +107,14 @@ double fit_fit_seconds(const fit_job *job);
 /* A distance with four digits, or with as many as it takes to be above `above` if it is. */
 enum { FIT_DISTANCE_TEXT = 32 };
 const char *fit_distance(double distance, double above, char text[FIT_DISTANCE_TEXT]);
+
+/* ---- fit_notes.c, owners.c ------------------------------------------------------------------- */
+
+/* The model's header says where it comes from. */
+ovoid_status fit_annotate(const fit_job *job, size_t level);
+
+/* A line per atom with its ellipsoid, as CSV. */
+ovoid_status fit_owners_write(const fit_job *job, const fit_level *level);
 
 /* ---- trace.c, summary.c, report.c ------------------------------------------------------------ */
 
@@ -99,7 +130,31 @@ void fit_trace_destroy(fit_trace *trace);
 void fit_summary_before(const fit_job *job);
 void fit_summary_after(const fit_job *job);
 
-/* Writes what is known for programs, as JSON. */
+/* What is known for programs, as JSON to be deleted; NULL without memory. The models are there. */
+cJSON *fit_report_make(const fit_job *job);
 ovoid_status fit_report_write(const fit_job *job);
+
+/* ---- fit_batch.c, fit_batch_names.c, fit_batch_summary.c --------------------------------------
+ */
+
+/* What came of one of several molecules. */
+typedef struct fit_row {
+    const char *input;
+    int code; /* as if it were the only one */
+    bool measured;
+    uint64_t atoms, ellipsoids; /* 0: not known */
+    double distance;            /* NAN: not known */
+    double area, volume;        /* of the molecule */
+    double seconds;
+} fit_row;
+
+/* Whether several molecules can be fitted as asked; says why not. */
+bool fit_batch_check(const fit_job *job);
+/* Fits job->inputs one after the other into job->folder; returns the exit code, all said. */
+int fit_batch(fit_job *job);
+
+/* A row each, and how many were fitted, of `asked`. */
+void fit_batch_print(FILE *out, const fit_row *rows, size_t count, size_t asked,
+                     const char *folder);
 
 #endif

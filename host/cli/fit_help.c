@@ -12,8 +12,25 @@ static void print_files(FILE *stream) {
                     "where the model goes, - for standard output (default: the name of the "
                     "molecule with the extension .ovoid, in the current folder)",
                     stream);
-    cli_option_help("--report FILE", "write numbers about the fit as JSON", stream);
+    cli_option_help("--out-dir DIR",
+                    "where the models of several molecules go, under the molecules' names with the "
+                    "extension .ovoid; made if it is not there (default: the current folder)",
+                    stream);
+    cli_option_help("--report FILE",
+                    "write numbers about the fit as JSON; of several molecules a line for each",
+                    stream);
     cli_option_help("--trace FILE", "write a line per iteration or step as CSV", stream);
+    cli_option_help("--owners FILE",
+                    "write a line per atom as CSV: its number, x, y, z and the number of the "
+                    "ellipsoid that it became part of, both from 1; of further levels to "
+                    "FILE.level2.csv and so on",
+                    stream);
+    fputs("\n"
+          "Several molecules are fitted one after the other; one that fails does not stop the\n"
+          "others. A table of all ends the run, and the exit code tells whether all, some or none\n"
+          "were fitted. With them, and with --out-dir, the FILE of --trace and --owners is the\n"
+          "ending of names in DIR: --owners owners.csv writes DIR/NAME.owners.csv.\n",
+          stream);
     fputs("\nFiles appear whole at the end or not at all; those that exist are replaced.\n",
           stream);
 }
@@ -99,14 +116,13 @@ void cli_fit_help(FILE *stream) {
     ovoid_measure_options measuring;
     ovoid_fit_options_init(&defaults);
     ovoid_measure_options_init(&measuring);
-    fputs(
-        "Usage: ovoid fit MOLECULE [OPTION]...\n"
-        "\n"
-        "Fits a sparse model, a few rotated ellipsoid Gaussians, to the Gaussian surface of the\n"
-        "molecule in the file MOLECULE: PDB, mmCIF, PQR or XYZR, also compressed with gzip, or -\n"
-        "for standard input. Prints what was done and writes the model to a text file.\n"
-        "\n",
-        stream);
+    fputs("Usage: ovoid fit MOLECULE... [OPTION]...\n"
+          "\n"
+          "Fits a sparse model, a few rotated ellipsoid Gaussians, to the Gaussian surface of the\n"
+          "molecule in the file MOLECULE: PDB, mmCIF, PQR or XYZR, also compressed with gzip,\n"
+          "or - for standard input. Prints what was done and writes the model to a text file.\n"
+          "\n",
+          stream);
     print_files(stream);
     reading_help(stream, false);
     print_running(&defaults, stream);
@@ -122,6 +138,7 @@ void cli_fit_help(FILE *stream) {
           "  ovoid fit molecule.pqr --ratio 0.1 --levels 4   10 % of the atoms, 5 %, 2.5 %, 1.2 %\n"
           "  ovoid fit molecule.pqr -o model.ovoid --report report.json --device gpu\n"
           "  ovoid fit molecule.pqr --method l1              by the paper's Algorithm 1\n"
+          "  ovoid fit *.pqr --out-dir models                many, to models/NAME.ovoid\n"
           "  ovoid fit - -o model.ovoid < molecule.pqr       from standard input\n"
           "\n",
           stream);

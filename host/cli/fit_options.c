@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #define REAL(name, member, low, above, high, below, unit, help)                                    \
     { name, CLI_REAL, offsetof(ovoid_fit_options, member), low, high, above, below, unit, help }
@@ -101,6 +100,8 @@ enum {
     DEVICE,
     REPORT,
     TRACE,
+    OWNERS,
+    OUT_DIR,
     QUIET,
     KERNEL,
     FIRST_STEP,
@@ -118,6 +119,8 @@ static const struct option named[] = {
     {"device", required_argument, NULL, DEVICE},
     {"report", required_argument, NULL, REPORT},
     {"trace", required_argument, NULL, TRACE},
+    {"owners", required_argument, NULL, OWNERS},
+    {"out-dir", required_argument, NULL, OUT_DIR},
     {"quiet", no_argument, NULL, QUIET},
     READING_OPTIONS,
     {"kernel", required_argument, NULL, KERNEL},
@@ -288,104 +291,20 @@ static bool complete_options(const parser *p) {
     return true;
 }
 
-/* "model.ovoid" as "model.level2.ovoid"; NULL without memory. */
-static char *level_path(const char *path, size_t level) {
-    const char *slash = strrchr(path, '/');
-    const char *base = slash ? slash + 1 : path;
-    const char *dot = strrchr(base, '.');
-    if (!dot || dot == base) /* a dot in front makes no extension */
-        dot = base + strlen(base);
-    const size_t size = strlen(path) + 32;
-    char *name = malloc(size);
-    if (name)
-        snprintf(name, size, "%.*s.level%zu%s", (int)(dot - path), path, level + 1, dot);
-    return name;
-}
-
-static bool out_of_memory(void) {
-    cli_error("out of memory");
-    return false;
-}
-
-/* Names every level's file. */
-static bool complete_outputs(fit_job *job) {
-    struct stat info;
-    if (!job->output && strcmp(job->input, "-") == 0) {
-        cli_error("a molecule from standard input has no name: name the model's file with -o");
-        return false;
-    }
-    if (!job->output)
-        job->output = job->default_output = source_output(job->input, ".ovoid");
-    if (!job->output)
-        return out_of_memory();
-    job->levels[0].path = job->output;
-    if (job->level_count == 1)
-        return true;
-    if (strcmp(job->output, "-") == 0) {
-        cli_error("--levels writes several models, which standard output cannot take: name the "
-                  "first one's file with -o");
-        return false;
-    }
-    /* A folder is refused as for one model. */
-    if (stat(job->output, &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode)) {
-        cli_error("--levels writes several models, but '%s' is no regular file", job->output);
-        return false;
-    }
-    for (size_t i = 1; i < job->level_count; i++) {
-        job->levels[i].path = job->levels[i].own_path = level_path(job->output, i);
-        if (!job->levels[i].path)
-            return out_of_memory();
-    }
-    return true;
-}
-
-typedef struct named_file {
-    const char *what, *path; /* path NULL: none */
-} named_file;
-
-static bool check_pair(named_file a, named_file b) {
-    if (!a.path || !b.path || !cli_same_file(a.path, b.path))
-        return true;
-    if (strcmp(a.path, "-") == 0)
-        cli_error("%s and %s cannot both go to standard output", a.what, b.what);
-    else
-        cli_error("%s and %s are the same file '%s'", a.what, b.what, b.path);
-    return false;
-}
-
-/* What goes where must be told apart before anything is written. */
-static bool check_files(const fit_job *job) {
-    enum { LEVELS_AT = 4, MOST = LEVELS_AT + FIT_LEVELS_MAX };
-    char what[FIT_LEVELS_MAX][32];
-    named_file files[MOST] = {{"the molecule", strcmp(job->input, "-") == 0 ? NULL : job->input},
-                              {"the model (-o)", job->output},
-                              {"the report (--report)", job->report},
-                              {"the trace (--trace)", job->trace}};
-    size_t count = LEVELS_AT;
-    for (size_t level = 1; level < job->level_count; level++) {
-        snprintf(what[level], sizeof what[level], "the model of level %zu", level + 1);
-        files[count++] = (named_file){what[level], job->levels[level].path};
-    }
-    for (size_t i = 0; i < count; i++)
-        for (size_t j = i + 1; j < count; j++)
-            if (!check_pair(files[i], files[j]))
-                return false;
-    return true;
-}
-
 static bool complete(int argc, char **argv, const parser *p) {
     if (optind == argc) {
         cli_error("which molecule? Name its file: ovoid fit MOLECULE (see 'ovoid fit --help')");
         return false;
     }
-    if (optind + 1 < argc) {
-        cli_error("one molecule at a time, but '%s' follows '%s' (see 'ovoid fit --help')",
-                  argv[optind + 1], argv[optind]);
+    if (!check_method(p) || !complete_options(p))
         return false;
-    }
-    p->job->input = argv[optind];
-    return check_method(p) && complete_options(p) && complete_outputs(p->job) &&
-           check_files(p->job);
+    fit_job *job = p->job;
+    job->input = argv[optind];
+    job->inputs = argv + optind;
+    job->input_count = (size_t)(argc - optind);
+    if (job->input_count > 1 && !job->folder)
+        job->folder = ".";
+    return job->folder ? fit_batch_check(job) : fit_outputs_name(job) && fit_outputs_check(job);
 }
 
 static void fill_long_options(struct option *all) {
@@ -414,6 +333,12 @@ static bool parse_named(parser *p, int option) {
         return true;
     case TRACE:
         job->trace = optarg;
+        return true;
+    case OWNERS:
+        job->owners = optarg;
+        return true;
+    case OUT_DIR:
+        job->folder = optarg;
         return true;
     case 'q':
     case QUIET:

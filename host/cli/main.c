@@ -29,25 +29,56 @@ static const subcommand subcommands[] = {
 };
 enum { SUBCOMMANDS = sizeof subcommands / sizeof subcommands[0] };
 
-static void print_message(const char *kind, const char *format, va_list args) {
+static const char *subject; /* what messages are about, NULL: nothing in particular */
+static char *last_error;
+
+/* The text of a message; NULL without memory. */
+static char *compose(const char *format, va_list args) {
+    va_list again;
+    va_copy(again, args);
+    const int length = vsnprintf(NULL, 0, format, args);
+    char *text = length < 0 ? NULL : malloc((size_t)length + 1);
+    if (text)
+        vsnprintf(text, (size_t)length + 1, format, again);
+    va_end(again);
+    return text;
+}
+
+/* Returns the text, without the subject; NULL without memory. */
+static char *print_message(const char *kind, const char *format, va_list args) {
+    char *text = compose(format, args);
+    const char *const shown = text ? text : format;
     cli_progress_erase();
     fflush(stdout); /* so that both streams read in order where they end up in one place */
-    fprintf(stderr, "ovoid: %s: ", kind);
-    vfprintf(stderr, format, args);
-    putc('\n', stderr);
+    if (subject && !strstr(shown, subject))
+        fprintf(stderr, "ovoid: %s: %s: %s\n", kind, subject, shown);
+    else
+        fprintf(stderr, "ovoid: %s: %s\n", kind, shown);
+    return text;
+}
+
+void cli_message_subject(const char *about) {
+    subject = about;
+    free(last_error);
+    last_error = NULL;
+}
+
+const char *cli_last_error(void) {
+    return last_error ? last_error : "";
 }
 
 void cli_error(const char *format, ...) {
     va_list args;
     va_start(args, format);
-    print_message("error", format, args);
+    free(last_error);
+    last_error = print_message("error", format, args);
     va_end(args);
 }
 
 void cli_warning(const char *format, ...) {
     va_list args;
     va_start(args, format);
-    print_message("warning", format, args);
+    free(print_message("warning", format, args));
     va_end(args);
 }
 
@@ -138,6 +169,8 @@ void cli_print_exit_codes(FILE *stream) {
           "  5    no OpenCL device, or none that matches\n"
           "  6    out of memory, over a limit, or numbers that are not finite\n"
           "  7    a fit did not reach its goal: the best model it found is written\n"
+          "  8    of several molecules some were fitted and some failed\n"
+          "  9    of several molecules none was fitted, for different reasons (for one: its code)\n"
           "  130  interrupted with Ctrl-C (143: terminated, 129: hung up)\n",
           stream);
 }

@@ -84,6 +84,8 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
     const ovoid_fit_result *result = &level->result;
     const bool l1 = job->options.method == OVOID_METHOD_L1;
     add_string(b, "output", level->path);
+    if (level->owners)
+        add_string(b, "owners", level->owners);
     add_number(b, "ellipsoids", (double)result->ellipsoids);
     add_number(b, "sparse_ratio",
                (double)result->ellipsoids / (double)ovoid_molecule_atoms(job->molecule));
@@ -154,7 +156,7 @@ static void add_profile(builder *b, const fit_job *job) {
     b->good = profile.good;
 }
 
-ovoid_status fit_report_write(const fit_job *job) {
+cJSON *fit_report_make(const fit_job *job) {
     builder b = {cJSON_CreateObject(), true};
     b.good = b.object != NULL;
     add_string(&b, "version", ovoid_version());
@@ -173,8 +175,17 @@ ovoid_status fit_report_write(const fit_job *job) {
     add_times(&b, job);
     add_profile(&b, job);
     b.good = b.good && cli_profile_report(&job->profile, b.object);
-    ovoid_status status =
-        b.good ? cli_json_write(job->context, b.object, job->report) : OVOID_ERROR_MEMORY;
-    cJSON_Delete(b.object);
+    if (!b.good) {
+        cJSON_Delete(b.object);
+        b.object = NULL;
+    }
+    return b.object;
+}
+
+ovoid_status fit_report_write(const fit_job *job) {
+    cJSON *report = fit_report_make(job);
+    const ovoid_status status =
+        report ? cli_json_write(job->context, report, job->report) : OVOID_ERROR_MEMORY;
+    cJSON_Delete(report);
     return status;
 }

@@ -124,5 +124,7 @@ void fit_summary_after(const fit_job *job) {
         print_written(out, "report", job->report);
     if (job->trace && !job->tracer.failed)
         print_written(out, "trace", job->trace);
+    if (job->owners && !job->owners_failed)
+        print_written(out, "owners", job->owners);
     cli_profile_print(&job->profile, "fit", out);
 }

@@ -107,3 +107,11 @@ void ov_quadric_of_atom(const double xyzr[4], double d, ov_quadric *quadric) {
     quadric->a[0] = quadric->a[3] = quadric->a[5] = d;
     quadric->a[1] = quadric->a[2] = quadric->a[4] = 0.0;
 }
+
+double ov_quadric_log_value(const ov_quadric *quadric, const double at[3]) {
+    const double *const a = quadric->a;
+    const double x = at[0] - quadric->centre[0], y = at[1] - quadric->centre[1],
+                 z = at[2] - quadric->centre[2];
+    return log(quadric->amplitude) - (a[0] * x * x + a[3] * y * y + a[5] * z * z +
+                                      2.0 * (a[1] * x * y + a[2] * x * z + a[4] * y * z));
+}

@@ -28,6 +28,9 @@ void ov_quadratic_form(double r[3][3], const double decay[3], double a[6]);
 
 void ov_quadric_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_quadric *quadric);
 
+/* ln of its value at a point. */
+double ov_quadric_log_value(const ov_quadric *quadric, const double at[3]);
+
 /* Largest d r^2 of an atom: up to here its exp(d r^2), and sums of many, fit a float. */
 #define OV_EXPONENT_MAX 80.0
 

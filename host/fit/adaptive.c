@@ -54,7 +54,8 @@ static ovoid_status prepare(ov_adaptive *f) {
     f->capacity = f->atoms + f->atoms / 4 + 2;
     f->quadrics = ov_alloc(f->context, f->capacity, sizeof *f->quadrics, "ellipsoids");
     f->twin = ov_alloc(f->context, f->capacity, sizeof *f->twin, "ellipsoids");
-    if (!f->quadrics || !f->twin)
+    f->parents = ov_alloc(f->context, 2 * f->capacity, sizeof *f->parents, "merges");
+    if (!f->quadrics || !f->twin || !f->parents)
         return OVOID_ERROR_MEMORY;
     OV_TRY(ov_lattice_create(f->context, f->xyzr, f->atoms, f->spacing, padding, &lattice));
     OV_TRY(ov_sample(f->context, f->xyzr, f->atoms, options->decay, &lattice, band, sampling,
@@ -172,11 +173,13 @@ static void destroy(ov_adaptive *f) {
     ov_samples_destroy(&f->samples);
     free(f->quadrics);
     free(f->twin);
+    free(f->parents);
 }
 
 ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                              const ovoid_fit_options *options, double began,
-                             ovoid_ellipsoid **ellipsoids, ovoid_fit_result *result) {
+                             ovoid_ellipsoid **ellipsoids, uint32_t **owner,
+                             ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
     ov_trial best = {0};
@@ -198,9 +201,11 @@ ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t 
     result->sample_seconds = ov_seconds() - began;
     OV_TRY(reach_goal(&f, &best));
     OV_TRY(finish(&f, &best, ellipsoids, result));
+    *owner = best.owner;
+    best.owner = NULL;
     result->profile.launches = device->launches - launches;
 cleanup:
-    free(best.x);
+    ov_trial_destroy(&best);
     destroy(&f);
     return status;
 }

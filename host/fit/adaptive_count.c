@@ -13,14 +13,19 @@ static ovoid_status repair_once(ov_adaptive *f, const ov_trial *from, size_t ski
                                 ov_trial *to) {
     ovoid_status status = OVOID_OK;
     double misfit;
-    const ov_merging merging = {.twin = f->twin};
+    size_t split;
+    const ov_merging merging = {.twin = f->twin, .parents = f->parents};
     ov_trial_copy(from, to);
     OV_TRY(ov_refine_evaluate(&f->refiner, &f->target, to->x, to->count, &misfit));
     OV_TRY(ov_split_worst(&f->refiner, &f->merger, &f->target, to->x, &to->count, skip, more,
                           f->twin));
     OV_TRY(ov_adaptive_refine_quickly(f, to, "repair"));
+    OV_TRY(ov_adaptive_share_atoms(f, to));
+    split = to->count;
     OV_TRY(
         ov_merge_cheapest(&f->refiner, &f->merger, &f->target, to->x, &to->count, more, &merging));
+    OV_TRY(
+        ov_owner_merge(f->context, f->parents, to->count, split, to->owner, f->atoms, to->owner));
     OV_TRY(ov_adaptive_refine_fully(f, to, "repair"));
     OV_TRY(ov_adaptive_judge(f, to));
 cleanup:
@@ -48,7 +53,7 @@ static ovoid_status repair(ov_adaptive *f, ov_trial *best, uint32_t rounds) {
         }
     }
 cleanup:
-    free(other.x);
+    ov_trial_destroy(&other);
     return status;
 }
 
@@ -79,6 +84,6 @@ ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best) {
             ov_trial_swap(&other, best);
     }
 cleanup:
-    free(other.x);
+    ov_trial_destroy(&other);
     return status;
 }

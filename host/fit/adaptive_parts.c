@@ -21,16 +21,27 @@ static const struct {
 #define SOME_MOST 0.5
 
 ovoid_status ov_trial_create(const ov_adaptive *f, ov_trial *t) {
-    *t = (ov_trial){.x = ov_alloc(f->context, f->capacity * OV_FACTOR_PARAMETERS, sizeof(double),
-                                  "parameters")};
-    return t->x ? OVOID_OK : OVOID_ERROR_MEMORY;
+    *t = (ov_trial){
+        .x = ov_alloc(f->context, f->capacity * OV_FACTOR_PARAMETERS, sizeof(double), "parameters"),
+        .owner = ov_alloc(f->context, f->atoms, sizeof *t->owner, "owners"),
+        .atoms = f->atoms};
+    return t->x && t->owner ? OVOID_OK : OVOID_ERROR_MEMORY;
+}
+
+void ov_trial_destroy(ov_trial *t) {
+    free(t->x);
+    free(t->owner);
+    *t = (ov_trial){0};
 }
 
 void ov_trial_copy(const ov_trial *from, ov_trial *to) {
     double *const x = to->x;
+    uint32_t *const owner = to->owner;
     memcpy(x, from->x, from->count * OV_FACTOR_PARAMETERS * sizeof *x);
+    memcpy(owner, from->owner, from->atoms * sizeof *owner);
     *to = *from;
     to->x = x;
+    to->owner = owner;
 }
 
 void ov_trial_swap(ov_trial *a, ov_trial *b) {
@@ -116,6 +127,11 @@ ovoid_status ov_adaptive_refine_quickly(ov_adaptive *f, ov_trial *t, const char 
     return ov_adaptive_refine(f, t, stage, 6, 1e-1, 1e-2);
 }
 
+ovoid_status ov_adaptive_share_atoms(ov_adaptive *f, ov_trial *t) {
+    ov_adaptive_quadrics(f, t);
+    return ov_owner_split(f->context, f->xyzr, f->atoms, f->quadrics, t->count, f->twin, t->owner);
+}
+
 ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t) {
     ov_adaptive_quadrics(f, t);
     return ov_judge_model(&f->judge, f->quadrics, t->count, &t->judgement);
@@ -130,7 +146,7 @@ ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial
         OV_TRY(ov_reduction_create(f->context, f->quadrics, f->atoms, 1, &starts[kind],
                                    &f->reduction[kind]));
     }
-    OV_TRY(ov_reduction_cut(f->context, f->reduction[kind], count, f->quadrics, NULL));
+    OV_TRY(ov_reduction_cut(f->context, f->reduction[kind], count, f->quadrics, t->owner));
     for (size_t i = 0; i < count; ++i)
         ov_factor_of_quadric(&f->quadrics[i], t->x + i * OV_FACTOR_PARAMETERS);
     t->count = count;
@@ -165,7 +181,7 @@ static ovoid_status start(ov_adaptive *f, size_t kinds, size_t count, ov_trial *
     ov_adaptive_drop_reductions(f); /* as large as the molecule, and quick to make again */
     OV_TRY(ov_adaptive_refine_fully(f, best, "refine"));
 cleanup:
-    free(other.x);
+    ov_trial_destroy(&other);
     return status;
 }
 

@@ -11,6 +11,7 @@
 #include "fit/judge.h"
 #include "fit/local.h"
 #include "fit/merge.h"
+#include "fit/owner.h"
 #include "fit/reduce.h"
 #include "fit/refine.h"
 
@@ -37,13 +38,16 @@ typedef struct ov_adaptive {
     double misfit;
     size_t capacity; /* ellipsoids that the arrays below hold */
     ov_quadric *quadrics;
-    uint32_t *twin;
+    uint32_t *twin;    /* of halves, as of ov_split_worst() */
+    uint32_t *parents; /* of merges, as of ov_merging */
 } ov_adaptive;
 
 /* A model with what is known of it. */
 typedef struct ov_trial {
     double *x; /* room for capacity ellipsoids */
     size_t count;
+    uint32_t *owner; /* of each atom: the ellipsoid that it is part of */
+    size_t atoms;
     double misfit;
     ov_judgement judgement;
 } ov_trial;
@@ -52,6 +56,7 @@ typedef struct ov_trial {
 bool ov_adaptive_report(void *fit);
 
 ovoid_status ov_trial_create(const ov_adaptive *f, ov_trial *t);
+void ov_trial_destroy(ov_trial *t);
 void ov_trial_copy(const ov_trial *from, ov_trial *to);
 void ov_trial_swap(ov_trial *a, ov_trial *b);
 
@@ -67,6 +72,10 @@ ovoid_status ov_adaptive_refine_quickly(ov_adaptive *f, ov_trial *t, const char 
 /* Refines the chosen ellipsoids alone, unless they are most of them; t->misfit stays as it is. */
 ovoid_status ov_adaptive_refine_some(ov_adaptive *f, ov_trial *t, const char *stage, uint32_t steps,
                                      const bool *chosen);
+
+/* After splits, and best once the halves have been refined: shares out the atoms of each ellipsoid
+ * that was split between it and its f->twin. */
+ovoid_status ov_adaptive_share_atoms(ov_adaptive *f, ov_trial *t);
 
 ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t);
 

@@ -39,15 +39,6 @@
 /* Nobody this near to where merging was too much (angstrom) is merged again. */
 #define FIXED_REACH 4.0
 
-/* ln of an ellipsoid's value at a point. */
-static double log_value(const ov_quadric *quadric, const double at[3]) {
-    const double *const a = quadric->a;
-    const double x = at[0] - quadric->centre[0], y = at[1] - quadric->centre[1],
-                 z = at[2] - quadric->centre[2];
-    return log(quadric->amplitude) - (a[0] * x * x + a[3] * y * y + a[5] * z * z +
-                                      2.0 * (a[1] * x * y + a[2] * x * z + a[4] * y * z));
-}
-
 typedef struct spot_list {
     ov_spot *spot;
     size_t count;
@@ -78,7 +69,7 @@ static size_t ellipsoid_at(const ov_quadric *quadrics, size_t count, const bool 
     size_t best = count;
     double largest = -INFINITY;
     for (size_t i = 0; i < count; ++i) {
-        const double value = chosen[i] ? -INFINITY : log_value(&quadrics[i], at);
+        const double value = chosen[i] ? -INFINITY : ov_quadric_log_value(&quadrics[i], at);
         if (value > largest) {
             largest = value;
             best = i;
@@ -87,16 +78,20 @@ static size_t ellipsoid_at(const ov_quadric *quadrics, size_t count, const bool 
     return best;
 }
 
-/* Splits the `each` ellipsoids that weigh most at each spot; returns how many that were. */
+/* Splits the `each` ellipsoids that weigh most at each spot; returns how many that were. f->twin
+ * then leads from each half to the other. */
 static size_t split_at_spots(ov_adaptive *f, ov_trial *t, const spot_list *spots, size_t each,
                              bool *chosen) {
     const size_t before = t->count;
+    memset(f->twin, 0xff, f->capacity * sizeof *f->twin);
     for (size_t n = 0; n < spots->count; ++n)
         for (size_t k = 0; k < each && t->count < f->atoms; ++k) {
             const size_t i = ellipsoid_at(f->quadrics, before, chosen, spots->spot[n].at);
             if (i == before)
                 break;
             chosen[i] = true;
+            f->twin[i] = (uint32_t)t->count;
+            f->twin[t->count] = (uint32_t)i;
             ov_split(t->x + i * OV_FACTOR_PARAMETERS, t->x + t->count * OV_FACTOR_PARAMETERS);
             ++t->count;
         }
@@ -111,7 +106,7 @@ static void choose_at_spots(ov_adaptive *f, const ov_trial *t, const spot_list *
     for (size_t i = 0; i < t->count; ++i) {
         chosen[i] = false;
         for (size_t n = 0; n < spots->count && !chosen[i]; ++n)
-            chosen[i] = log_value(&f->quadrics[i], spots->spot[n].at) > least;
+            chosen[i] = ov_quadric_log_value(&f->quadrics[i], spots->spot[n].at) > least;
     }
 }
 
@@ -134,6 +129,7 @@ static ovoid_status grow_at(ov_adaptive *f, ov_trial *t, const spot_list *spots,
         goto cleanup;
     choose_at_spots(f, t, spots, chosen);
     OV_TRY(ov_adaptive_refine_some(f, t, "grow", LOCAL_STEPS, chosen));
+    OV_TRY(ov_adaptive_share_atoms(f, t));
 cleanup:
     free(chosen);
     return status;
@@ -171,7 +167,7 @@ static ovoid_status grow(ov_adaptive *f, double tolerance, ov_trial *best) {
     }
 cleanup:
     free(spots.spot);
-    free(next.x);
+    ov_trial_destroy(&next);
     return status;
 }
 
@@ -217,8 +213,8 @@ cleanup:
 }
 
 static void shrinking_destroy(shrinking *s) {
-    free(s->next.x);
-    free(s->back.x);
+    ov_trial_destroy(&s->next);
+    ov_trial_destroy(&s->back);
     free(s->parents);
     free(s->back_parents);
     free(s->failed.spot);
@@ -257,6 +253,12 @@ static void take_back(shrinking *s, const ov_trial *best, const spot_list *spots
     s->back_parents = swap;
 }
 
+/* Each atom's owner in the model merged, from that in the best one. */
+static ovoid_status follow_parents(ov_adaptive *f, const ov_trial *best, shrinking *s) {
+    return ov_owner_merge(f->context, s->parents, s->next.count, best->count, best->owner, f->atoms,
+                          s->next.owner);
+}
+
 /* Where merging was too much, goes back to the best model, region by region. */
 static ovoid_status settle(ov_adaptive *f, double tolerance, const ov_trial *best, shrinking *s) {
     ovoid_status status = OVOID_OK;
@@ -267,6 +269,7 @@ static ovoid_status settle(ov_adaptive *f, double tolerance, const ov_trial *bes
         OV_TRY(emphasise(f, &spots));
         OV_TRY(remember(f, &spots, &s->failed));
         take_back(s, best, &spots, reach);
+        OV_TRY(follow_parents(f, best, s));
         if (s->next.count == best->count)
             break;
         choose_near(&s->next, &spots, reach + BACK_MARGIN, s->chosen);
@@ -289,6 +292,7 @@ static ovoid_status merge(ov_adaptive *f, const ov_trial *best, size_t fewer, sh
     OV_TRY(ov_refine_evaluate(&f->refiner, &f->target, s->next.x, s->next.count, &misfit));
     OV_TRY(ov_merge_cheapest(&f->refiner, &f->merger, &f->target, s->next.x, &s->next.count, fewer,
                              &merging));
+    OV_TRY(follow_parents(f, best, s));
 cleanup:
     return status;
 }

@@ -1,5 +1,6 @@
 #include "fit/adaptive.h"
 #include "fit/l1.h"
+#include "fit/model.h"
 #include "fit/options.h"
 
 #include <math.h>
@@ -44,7 +45,8 @@ static ovoid_status sample_band(ovoid_context *context, const ovoid_molecule *mo
 
 static ovoid_status fit_l1(ovoid_context *context, const ovoid_molecule *molecule,
                            const ovoid_fit_options *options, double began,
-                           ovoid_ellipsoid **ellipsoids, ovoid_fit_result *result) {
+                           ovoid_ellipsoid **ellipsoids, uint32_t **owner,
+                           ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_samples samples = {0};
     OV_TRY(sample_band(context, molecule, options, began, &samples));
@@ -53,7 +55,7 @@ static ovoid_status fit_l1(ovoid_context *context, const ovoid_molecule *molecul
     result->reached = true;
     result->distance = NAN;
     OV_TRY(ov_l1_fit(context, ovoid_molecule_xyzr(molecule), ovoid_molecule_atoms(molecule),
-                     &samples, options, began, ellipsoids, result));
+                     &samples, options, began, ellipsoids, owner, result));
 cleanup:
     ov_samples_destroy(&samples);
     return status;
@@ -64,6 +66,8 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
                        ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ovoid_ellipsoid *ellipsoids = NULL;
+    uint32_t *owner = NULL;
+    ovoid_model *made = NULL;
     ovoid_fit_result done = {0};
     ov_device *device;
     if (!context || !molecule || !options || !model)
@@ -75,15 +79,18 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
     OV_TRY(ov_atoms_check(context, xyzr, atoms, options->decay));
     OV_TRY(ov_device_get(context, &device));
     if (options->method == OVOID_METHOD_L1)
-        OV_TRY(fit_l1(context, molecule, options, began, &ellipsoids, &done));
+        OV_TRY(fit_l1(context, molecule, options, began, &ellipsoids, &owner, &done));
     else
-        OV_TRY(ov_adaptive_fit(context, xyzr, atoms, options, began, &ellipsoids, &done));
+        OV_TRY(ov_adaptive_fit(context, xyzr, atoms, options, began, &ellipsoids, &owner, &done));
     OV_TRY(ovoid_model_create(context, ellipsoids, (size_t)done.ellipsoids, options->decay,
-                              options->isovalue, model));
+                              options->isovalue, &made));
+    ov_model_take_owner(made, &owner, atoms);
+    *model = made;
     done.fit_seconds = ov_seconds() - began - done.sample_seconds;
     if (result)
         *result = done;
 cleanup:
     free(ellipsoids);
+    free(owner);
     return status;
 }

@@ -1,6 +1,7 @@
 #include "fit/l1.h"
 
 #include "fit/l1_objective.h"
+#include "fit/owner.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,6 +16,7 @@ typedef struct fit {
     const ovoid_fit_options *options;
     ov_l1_objective objective;
     size_t count;            /* ellipsoids */
+    uint32_t *atom;          /* of each, where it began */
     double *x;               /* accepted parameters, OV_L1_PARAMETERS per ellipsoid */
     double *trial;           /* between searches: the parameters before the last accepted step */
     double *gradient;        /* at x */
@@ -33,6 +35,7 @@ static bool prune(fit *f) {
         const double *const p = f->x + i * OV_L1_PARAMETERS;
         if (i != largest && fabs(p[OV_L1_C]) < f->options->l1.prune_below)
             continue;
+        f->atom[kept] = f->atom[i];
         if (kept != i)
             memcpy(f->x + kept * OV_L1_PARAMETERS, p, OV_L1_PARAMETERS * sizeof *p);
         ++kept;
@@ -195,6 +198,7 @@ static void initialise(fit *f, const double *xyzr) {
     for (size_t i = 0; i < f->count; ++i) {
         double *const p = f->x + i * OV_L1_PARAMETERS;
         const double *const atom = xyzr + 4 * i;
+        f->atom[i] = (uint32_t)i;
         p[OV_L1_C] = exp(0.5 * d * atom[3] * atom[3]);
         for (size_t k = 0; k < 3; ++k) {
             p[OV_L1_D + k] = sqrt(d);
@@ -211,11 +215,15 @@ static ovoid_status allocate(fit *f, ovoid_context *context, const ov_samples *s
         if (!(*vectors[k] =
                   ov_alloc(context, f->count * OV_L1_PARAMETERS, sizeof(double), "parameters")))
             return OVOID_ERROR_MEMORY;
+    f->atom = ov_alloc(context, f->count, sizeof *f->atom, "atoms");
+    if (!f->atom)
+        return OVOID_ERROR_MEMORY;
     return ov_l1_objective_create(context, samples, limit, f->options->l1.kernel, f->count,
                                   &f->objective);
 }
 
 static void destroy(fit *f) {
+    free(f->atom);
     free(f->x);
     free(f->trial);
     free(f->gradient);
@@ -234,9 +242,33 @@ static ovoid_status hand_over(fit *f, ovoid_ellipsoid **ellipsoids) {
     return OVOID_OK;
 }
 
+/* See l1.h. Atoms of deleted ellipsoids are compared with all that are left: a moment, beside
+ * thousands of iterations. */
+static ovoid_status find_owners(const fit *f, const double *xyzr, size_t atoms, uint32_t **owner) {
+    ovoid_context *const context = f->objective.context;
+    ov_quadric *const quadrics = ov_alloc(context, f->count, sizeof *quadrics, "ellipsoids");
+    uint32_t *const found = ov_alloc(context, atoms, sizeof *found, "owners");
+    if (!quadrics || !found) {
+        free(quadrics);
+        free(found);
+        return OVOID_ERROR_MEMORY;
+    }
+    memset(found, 0xff, atoms * sizeof *found);
+    for (size_t i = 0; i < f->count; ++i) {
+        ov_l1_quadric(f->x + i * OV_L1_PARAMETERS, &quadrics[i]);
+        found[f->atom[i]] = (uint32_t)i;
+    }
+    for (size_t i = 0; i < atoms; ++i)
+        if (found[i] == UINT32_MAX)
+            found[i] = ov_owner_at(quadrics, f->count, xyzr + 4 * i);
+    free(quadrics);
+    *owner = found;
+    return OVOID_OK;
+}
+
 ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                        const ov_samples *samples, const ovoid_fit_options *options, double began,
-                       ovoid_ellipsoid **ellipsoids, ovoid_fit_result *result) {
+                       ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
     ov_l1_evaluation last;
@@ -246,6 +278,7 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     OV_TRY(allocate(&f, context, samples));
     initialise(&f, xyzr);
     OV_TRY(iterate(&f, began, &last, &result->iterations));
+    OV_TRY(find_owners(&f, xyzr, atoms, owner));
     OV_TRY(hand_over(&f, ellipsoids));
     result->points = samples->points.count;
     result->ellipsoids = f.count;

@@ -75,6 +75,7 @@ void ovoid_model_destroy(ovoid_model **model) {
         free((*model)->notes[i]);
     free((*model)->notes);
     free((*model)->ellipsoids);
+    free((*model)->owner);
     free(*model);
     *model = NULL;
 }
@@ -93,6 +94,21 @@ double ovoid_model_decay(const ovoid_model *model) {
 
 double ovoid_model_isovalue(const ovoid_model *model) {
     return model ? model->isovalue : NAN;
+}
+
+const uint32_t *ovoid_model_owner(const ovoid_model *model) {
+    return model ? model->owner : NULL;
+}
+
+size_t ovoid_model_owner_count(const ovoid_model *model) {
+    return model ? model->owner_count : 0;
+}
+
+void ov_model_take_owner(ovoid_model *model, uint32_t **owner, size_t atoms) {
+    free(model->owner);
+    model->owner = *owner;
+    model->owner_count = atoms;
+    *owner = NULL;
 }
 
 const char *ovoid_model_note(const ovoid_model *model, size_t index) {

@@ -14,6 +14,8 @@ struct ovoid_model {
     size_t count;
     double decay; /* angstrom^-2 */
     double isovalue;
+    uint32_t *owner; /* of each atom: the ellipsoid that it is part of; NULL: not known */
+    size_t owner_count;
     char **notes; /* "key: value" */
     size_t note_count;
     size_t note_capacity;
@@ -29,6 +31,9 @@ const char *ov_ellipsoid_value_problem(size_t value, double number);
 /* Whether a note may have this key: it is neither empty nor one that the model file writes by
  * itself, does not begin with '#' or a blank, and holds no colon and no control character. */
 bool ov_model_key_valid(const char *key);
+
+/* Takes over *owner, one entry per atom, which becomes NULL. */
+void ov_model_take_owner(ovoid_model *model, uint32_t **owner, size_t atoms);
 
 /* Adds the finished note text "key: value" (copied, `length` bytes). */
 ovoid_status ov_model_add_note(ovoid_context *context, ovoid_model *model, const char *text,

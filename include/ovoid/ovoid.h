@@ -415,6 +415,19 @@ OVOID_API const ovoid_ellipsoid *ovoid_model_ellipsoids(const ovoid_model *model
 OVOID_API double ovoid_model_decay(const ovoid_model *model);
 OVOID_API double ovoid_model_isovalue(const ovoid_model *model);
 
+/* For each atom of the molecule that the model was fitted to, in the molecule's order, the index
+ * (from 0) of the ellipsoid that it became part of. NULL where nobody knows: owners are kept by
+ * ovoid_fit(), not by model files.
+ * - adaptive: the ellipsoid into which the atom's Gaussian was merged. When an ellipsoid is split,
+ *   each of its atoms goes to the half with the larger value at the atom's centre, and one at least
+ *   to each half; a half of an ellipsoid of one atom may own none.
+ * - l1: the ellipsoid that the atom's Gaussian became; where that one was deleted, the ellipsoid
+ *   with the largest value at the atom's centre. Every ellipsoid owns at least one atom. */
+OVOID_API const uint32_t *ovoid_model_owner(const ovoid_model *model);
+
+/* Entries of ovoid_model_owner(): atoms of that molecule; 0 where nobody knows. */
+OVOID_API size_t ovoid_model_owner_count(const ovoid_model *model);
+
 /* Header lines of a model file, "key: value" each, without '#'. NULL past the end. They come from
  * the file read, or from ovoid_model_annotate(). */
 OVOID_API const char *ovoid_model_note(const ovoid_model *model, size_t index);

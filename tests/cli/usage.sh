@@ -18,7 +18,16 @@ wrong "no command 'zzz' (" zzz
 wrong "no command 'fi'" help fi
 wrong "no option '--foo' before a command" --foo
 wrong "which molecule?" fit
-wrong "one molecule at a time, but 'b' follows 'a.xyzr'" fit a.xyzr b
+wrong "-o names the file of one model" fit a.xyzr b.xyzr -o c.ovoid
+wrong "-o names the file of one model" fit a.xyzr -o c.ovoid --out-dir d
+wrong "standard input has no name" fit a.xyzr -
+wrong "standard input has no name" fit - --out-dir d
+for option in trace owners; do
+    wrong "--$option takes the ending of names in the folder, such as $option.csv for NAME.$option.csv" \
+        fit a.xyzr b.xyzr --$option t/x.csv
+    wrong "--$option takes the ending of names" fit a.xyzr --out-dir d --$option -
+    wrong "--$option takes the ending of names" fit a.xyzr --out-dir d --$option ""
+done
 wrong "did you mean '--iterations'?" fit a.xyzr --iteratoins 3
 wrong "no option '--zzzzzz' (" fit a.xyzr --zzzzzz
 wrong "no option -x" fit a.xyzr -x
@@ -88,9 +97,14 @@ wrong "the molecule and the report (--report) are the same file" fit a.xyzr --re
 wrong "the report (--report) and the trace (--trace) are the same file" fit a.xyzr --report x \
     --trace ../work/x
 wrong "cannot both go to standard output" fit a.xyzr -o - --trace -
+wrong "cannot both go to standard output" fit a.xyzr --trace - --owners -
+wrong "the molecule and the owners (--owners) are the same file" fit a.xyzr --owners a.xyzr
 wrong "name the model's file with -o" fit -
 wrong "standard output cannot take" fit a.xyzr --levels 2 -o -
 wrong "'/dev/null' is no regular file" fit a.xyzr --levels 2 -o /dev/null
+wrong "several tables of owners, which standard output cannot take" fit a.xyzr --levels 2 --owners -
+wrong "the trace (--trace) and the owners of level 2 are the same file" fit a.xyzr --levels 2 \
+    --owners o.csv --trace o.level2.csv
 wrong "the report (--report) and the model of level 2 are the same file" fit a.xyzr --levels 2 \
     --report a.level2.ovoid
 wrong "the trace (--trace) and the model of level 3 are the same file" fit a.xyzr --levels 3 -o x.y \

@@ -1,0 +1,74 @@
+#include "fit/owner.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* What sharing out the atoms of split ellipsoids takes note of, per ellipsoid. */
+typedef struct half {
+    size_t atoms;
+    uint32_t readiest; /* of them, the one that loses least by going to the other half */
+    double loss;
+} half;
+
+/* Each atom to the half with the larger value. */
+static void share_out(const double *xyzr, size_t atoms, const ov_quadric *quadrics,
+                      const uint32_t *twin, half *halves, uint32_t *owner) {
+    for (size_t i = 0; i < atoms; ++i) {
+        const uint32_t whole = owner[i], other = twin[whole];
+        double loss = INFINITY;
+        if (other != UINT32_MAX) {
+            const double *const at = xyzr + 4 * i;
+            loss = ov_quadric_log_value(&quadrics[whole], at) -
+                   ov_quadric_log_value(&quadrics[other], at);
+        }
+        if (loss < 0.0)
+            owner[i] = other;
+        half *const own = &halves[owner[i]];
+        if (own->atoms++ == 0 || fabs(loss) < own->loss) {
+            own->readiest = (uint32_t)i;
+            own->loss = fabs(loss);
+        }
+    }
+}
+
+ovoid_status ov_owner_split(ovoid_context *context, const double *xyzr, size_t atoms,
+                            const ov_quadric *quadrics, size_t count, const uint32_t *twin,
+                            uint32_t *owner) {
+    half *const halves = ov_alloc(context, count, sizeof *halves, "owners");
+    if (!halves)
+        return OVOID_ERROR_MEMORY;
+    share_out(xyzr, atoms, quadrics, twin, halves, owner);
+    for (size_t i = 0; i < count; ++i)
+        if (twin[i] != UINT32_MAX && halves[i].atoms > 1 && halves[twin[i]].atoms == 0)
+            owner[halves[i].readiest] = twin[i];
+    free(halves);
+    return OVOID_OK;
+}
+
+ovoid_status ov_owner_merge(ovoid_context *context, const uint32_t *parents, size_t count,
+                            size_t before, const uint32_t *owner_before, size_t atoms,
+                            uint32_t *owner) {
+    uint32_t *const place = ov_alloc(context, before, sizeof *place, "owners");
+    if (!place)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < count; ++i)
+        for (size_t k = 0; k < 2 && parents[2 * i + k] != UINT32_MAX; ++k)
+            place[parents[2 * i + k]] = (uint32_t)i;
+    for (size_t i = 0; i < atoms; ++i)
+        owner[i] = place[owner_before[i]];
+    free(place);
+    return OVOID_OK;
+}
+
+uint32_t ov_owner_at(const ov_quadric *quadrics, size_t count, const double at[3]) {
+    size_t best = 0;
+    double largest = -INFINITY;
+    for (size_t i = 0; i < count; ++i) {
+        const double value = ov_quadric_log_value(&quadrics[i], at);
+        if (value > largest) {
+            largest = value;
+            best = i;
+        }
+    }
+    return (uint32_t)best;
+}

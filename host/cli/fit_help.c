@@ -20,11 +20,13 @@ static void print_files(FILE *stream) {
                     "write numbers about the fit as JSON; of several molecules a line for each",
                     stream);
     cli_option_help("--trace FILE", "write a line per iteration or step as CSV", stream);
-    cli_option_help("--owners FILE",
-                    "write a line per atom as CSV: its number, x, y, z and the number of the "
-                    "ellipsoid that it became part of, both from 1; of further levels to "
-                    "FILE.level2.csv and so on",
-                    stream);
+    cli_option_help(
+        "--owners FILE",
+        "write a line per atom as CSV: its number, x, y, z, the number of the ellipsoid "
+        "that it became part of, both from 1, and what the molecule's file calls it; of "
+        "further levels to "
+        "FILE.level2.csv and so on",
+        stream);
     fputs("\n"
           "Several molecules are fitted one after the other; one that fails does not stop the\n"
           "others. A table of all ends the run, and the exit code tells whether all, some or none\n"

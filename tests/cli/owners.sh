@@ -11,11 +11,13 @@ expect_out "owners    written to o.csv"
 expect_files a.xyzr a.ovoid a.level2.ovoid o.csv o.level2.csv r.json
 grep -q '"owners":[[:space:]]*"o.level2.csv"' r.json || fail "the report should name the owners' file"
 
+header=atom,x,y,z,ellipsoid,serial,name,element,residue,number,insertion,chain,placement
+
 # expect_owners TABLE MODEL COUNT: every atom once, where the molecule has it, every ellipsoid owns
 # one, and of most atoms the owner is among the three ellipsoids with the largest values at the centre,
 # computed from the model file by the formulas of README.md.
 expect_owners() {
-    [ "$(head -n 1 "$1")" = "atom,x,y,z,ellipsoid" ] || fail "$1 has no header"
+    [ "$(head -n 1 "$1")" = "$header" ] || fail "$1 has no header"
     awk -v count="$3" -v table="$1" -v model="$2" '
         function problem(text) { print table ": " text; bad = 1; exit 1 }
         FILENAME == model { if ($0 !~ /^(#|amplitude)/) {
@@ -77,3 +79,27 @@ if [ -w /dev/full ]; then
     grep -q "^owners" "$out" && fail "the owners were not written"
     expect_files a.xyzr a.ovoid
 fi
+
+# What the molecule's file calls its atoms, quoted where it would end a cell; of an assembly also the
+# placement.
+rm -f ./*
+cat >named.pdb <<'END'
+REMARK 350 BIOMOLECULE: 1
+REMARK 350 APPLY THE FOLLOWING TO CHAINS: A
+REMARK 350   BIOMT1   1  1.000000  0.000000  0.000000        0.00000
+REMARK 350   BIOMT2   1  0.000000  1.000000  0.000000        0.00000
+REMARK 350   BIOMT3   1  0.000000  0.000000  1.000000        0.00000
+REMARK 350   BIOMT1   2  1.000000  0.000000  0.000000        9.00000
+REMARK 350   BIOMT2   2  0.000000  1.000000  0.000000        0.00000
+REMARK 350   BIOMT3   2  0.000000  0.000000  1.000000        0.00000
+ATOM      7  N   GLY A  12B      1.000   2.000   3.000  1.00  0.00           N
+HETATM    9  C,1 LIG A  13       2.400   2.000   3.000  1.00  0.00           C
+END
+run "$OVOID" fit named.pdb --ellipsoids 1 --owners o.csv -q
+expect_code 0
+printf '%s\n' "$header" 1,1,2,3,1,7,N,N,GLY,12,B,A, '2,2.4,2,3,1,9,"C,1",C,LIG,13,,A,' >../wanted
+cmp o.csv ../wanted || fail "the atoms should be named: $(cat o.csv)"
+run "$OVOID" fit named.pdb --assembly 1 --ellipsoids 1 --owners o.csv -q
+expect_code 0
+[ "$(tail -n 1 o.csv)" = '4,11.4,2,3,1,9,"C,1",C,LIG,13,,A,2' ] ||
+    fail "the last atom should be of placement 2: $(cat o.csv)"

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 
 SURFACES = ("ADP", "1MAG", "FAS2")  # the rows of the paper's figure of surfaces
 KERNELS = "1MAG"  # the molecule of its figure of Gaussians
-WIDTH, HEIGHT = 1400, 440
+WIDTH, HEIGHT = 1400, 400
 
 
 def render(ovoid, inputs, options, path):

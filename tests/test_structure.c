@@ -186,6 +186,13 @@ static void choices_are_followed(void **state) {
     o.select = ";polymer";
     molecule = expect("a.pdb", pdb, &o, 4);
     ovoid_molecule_destroy(&molecule);
+    /* What stands in front of TER is of the polymer, whatever its record and name. */
+    molecule = expect("b.pdb",
+                      "HETATM    1  C1  XYZ A   1       1.000   2.000   3.000\n"
+                      "TER\n"
+                      "HETATM    2  C1  XYZ A   2       5.000   2.000   3.000\n",
+                      &o, 1);
+    ovoid_molecule_destroy(&molecule);
     o.select = "(HOH)";
     expect_failure("a.pdb", pdb, &o, OVOID_ERROR_EMPTY, "2 of waters");
     o.select = "[[[";

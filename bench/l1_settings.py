@@ -130,6 +130,8 @@ def summarise(rows, names, limits, counts):
     print("spacing padding epsilon inside step   iterations molecule  poses      ellipsoids (paper)   area %"
           "        volume %      Hausdorff      outer H   above the paper's")
     for setting, molecules in sorted(by_setting.items()):
+        if not any(name in molecules for name in names):
+            continue
         square, above, multiples = [], [], collections.defaultdict(list)
         for name in [n for n in names if n in molecules]:
             own = molecules[name]
@@ -150,7 +152,7 @@ def summarise(rows, names, limits, counts):
         score = math.sqrt(mean(square))
         whole = all(name in molecules for name in names)
         shares = {e: mean(v) for e, v in multiples.items()}
-        passes = whole and setting[5] == DEFAULTS["iterations"] and all(share <= 1.0 for share in shares.values())
+        passes = whole and shares and setting[5] == DEFAULTS["iterations"] and all(share <= 1.0 for share in shares.values())
         print(f"    root mean square of ln(count / paper): {score:.3f}; errors as multiples of the "
               "paper's, in the mean: " + ", ".join(f"{e} {v:.2f}" for e, v in shares.items())
               + ("" if passes else "; not for the rule")

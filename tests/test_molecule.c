@@ -374,15 +374,17 @@ static void pqr_records_are_told_apart(void **state) {
         "HETATM 2 O HOH 2 2.0 2.0 3.0 0.1 1.5\n"
         "CONECT    1    2    3    4    5    6\n"
         "END\n"
-        "ATOM 3 N ALA 3 3.0 2.0 3.0 0.1 1.5\n" /* files put together */
+        "ATOM 3 N ALA 3 3.0 2.0 3.0 0.1 1.5\n" /* a second file behind the first */
         "nothing else";
-    ovoid_molecule *molecule = expect_atoms("records.pqr", file, sizeof file - 1, 3);
-    for (int i = 0; i < 3; i++)
+    ovoid_molecule *molecule = expect_atoms("records.pqr", file, sizeof file - 1, 2);
+    for (int i = 0; i < 2; i++)
         expect_atom(molecule, (size_t)i, i + 1, 2, 3, i == 0 ? 0 : 1.5);
     ovoid_molecule_counts counts = ovoid_molecule_read_counts(molecule);
     assert_int_equal(counts.lines, 17);
     assert_int_equal(counts.zero_radius, 1);
-    assert_int_equal(counts.skipped, 0);
+    assert_int_equal(counts.skipped, 1);
+    assert_int_equal(counts.skipped_models, 1);
+    assert_non_null(strstr(warnings, "records.pqr: 1 of 2 atoms has radius 0"));
     assert_non_null(strstr(warnings, "records.pqr: 2 lines of no known kind ignored; line 12 is "
                                      "'Made by a program in 2001'\n"));
     ovoid_molecule_destroy(&molecule);
@@ -410,6 +412,22 @@ static void only_the_first_model_counts(void **state) {
     expect_models("MODEL 1\nENDMDL\nMODEL 2\n" A2 "ENDMDL\nMODEL 3\n" A1, 2, 1);
     expect_models(A1 "ENDMDL\n" A2 "ENDMDL\n" A2 "ENDMDL\n", 1, 2);
     expect_models("MODEL 1\n" A1 "ENDMDL\nMODEL 2\nATOM what ever\nENDMDL\n", 1, 1);
+    expect_models(A1 "END\n" A2 "END\n", 1, 1);
+    expect_models("END\n" A1 "TER\nEND\n" A2, 1, 1);
+}
+
+/* Atoms exactly where another is are most likely a file's second copy of them. */
+static void doubled_atoms_are_counted(void **state) {
+    (void)state;
+    static const char once[] = "1 2 3 1.5\n0 5 -0 1.2\n1 2 3.0001 1.5\n";
+    static const char twice[] = "1 2 3 1.5\n0 5 -0 1.2\n1 2 3 1.5\n-0 5 0 1.7\n1 2 3 1.5\n";
+    ovoid_molecule *molecule = expect_atoms("once.xyzr", once, sizeof once - 1, 3);
+    assert_string_equal(warnings, "");
+    ovoid_molecule_destroy(&molecule);
+    molecule = expect_atoms("twice.xyzr", twice, sizeof twice - 1, 5);
+    assert_non_null(strstr(warnings, "twice.xyzr: 3 of 5 atoms stand exactly where another does, "
+                                     "the first of them atom 3; "));
+    ovoid_molecule_destroy(&molecule);
 }
 
 /* ---- XYZR --------------------------------------------------------------------------------- */
@@ -1160,6 +1178,7 @@ int main(void) {
         cmocka_unit_test(pqr_errors_say_where),
         cmocka_unit_test(pqr_records_are_told_apart),
         cmocka_unit_test(only_the_first_model_counts),
+        cmocka_unit_test(doubled_atoms_are_counted),
         cmocka_unit_test(xyzr_lines_are_read),
         cmocka_unit_test(xyzr_errors_say_where),
         cmocka_unit_test(formats_are_recognised),

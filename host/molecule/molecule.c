@@ -468,6 +468,7 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
     OV_TRY(ov_text_open(context, path, &reader.text));
     OV_TRY(read_text(&reader, reader.guess ? format_by_name(path) : options.format));
     trim(reader.molecule);
+    OV_TRY(ov_molecule_doubts(context, ov_text_name(reader.text), reader.molecule));
     reader.molecule->counts.atoms = ovoid_molecule_atoms(reader.molecule);
     reader.molecule->counts.unit_atoms = reader.molecule->atoms;
     *molecule = reader.molecule;

@@ -44,4 +44,8 @@ struct ovoid_molecule {
     double *all_xyzr; /* 4 * all_atoms, made when first asked for */
 };
 
+/* Warns of atoms without a radius, and of atoms at the place of another. */
+ovoid_status ov_molecule_doubts(ovoid_context *context, const char *name,
+                                const ovoid_molecule *molecule);
+
 #endif

@@ -212,7 +212,8 @@ void ov_pdb_follow_models(ov_reader *reader, const char *text, size_t length) {
         int32_t number;
         const bool numbered = parse_integer(columns(&line, 5, 15), 15, &number);
         ov_sites_announce_model(&reader->sites, numbered ? number : OV_NO_MODEL);
-    } else if (is_word(text, length, "ENDMDL")) {
+    } else if (is_word(text, length, "ENDMDL") || is_word(text, length, "END")) {
+        /* END ends the file, but some programs put it between models. */
         ov_sites_end_model(&reader->sites);
     }
 }
@@ -223,8 +224,6 @@ ovoid_status ov_pdb_line(ov_reader *reader, const ov_line *line) {
         return read_atom(reader, line);
     if (is_word(text, line->length, "TER"))
         ov_sites_ter(reader);
-    else if (is_word(text, line->length, "END"))
-        ov_sites_end_model(&reader->sites); /* some programs put it between models */
     else if (ov_pdb_misses(line))
         return ov_text_fail(reader->text, line, text,
                             "an atom whose record is not in the columns of a PDB file");

@@ -101,3 +101,13 @@ run "$OVOID" mesh a.xyzr --isovalue 1e6
 expect_code 3
 expect_err "no surface"
 expect_files a.xyzr a.ovoid
+
+# Atoms without a radius hardly are what was meant: every command says so.
+rm -f ./*
+printf '0 0 0 0\n1.2 0 0 0\n0 1.2 0 0\n' >zero.xyzr
+for command in "mesh zero.xyzr -o zero.ply" "render zero.xyzr -o zero.png --size 40x30" \
+    "export zero.xyzr -o zero.dx" "fit zero.xyzr --ratio 1 -o zero.ovoid" "measure zero.xyzr zero.ovoid"; do
+    run "$OVOID" $command
+    expect_code 0
+    expect_err "warning: zero.xyzr: 3 of 3 atoms have radius 0"
+done

@@ -5,7 +5,7 @@ echo "9 9 9 0" >>a.xyzr
 run "$OVOID" fit a.xyzr --method l1 --iterations 60 --decay 0.45 --isovalue 1.1 --spacing 0.9 --padding 2.5 \
     --prune-every 7 --mesh-spacing 0.6 --report r.json --trace t.csv
 expect_code 0
-expect_silent
+expect_err "warning: a.xyzr: 1 of 31 atoms has radius 0"
 expect_out "molecule  a.xyzr: 31 atoms, 1 of them of radius 0"
 expect_out "surface   decay 0.45 Å⁻², isovalue 1.1"
 expect_out "spacing 0.9 Å, padding 2.5 Å"

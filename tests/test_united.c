@@ -1,20 +1,11 @@
 /*
  * Radii that stand for missing hydrogens: the facts against chemistry written down independently,
- * the guesses by shape on ideal geometry, and the order of the radii.
+ * the guesses by shape on ideal geometry and on a protein, and that protein's surface.
  */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "molecule/united.h"
 #include "molecule/united_table.h"
-
-#include <math.h>
-#include <stdbool.h>
-#include <string.h>
+#include "support.h"
+#include "surface/measure.h"
 
 /* ---- known residues ----------------------------------------------------------------------- */
 
@@ -145,7 +136,7 @@ static void test_shapes(void **state) {
     assert_int_equal(shaped("S", 1, 1.81, 0, 0), 1);        /* thiol */
     assert_int_equal(shaped("S", 1, 2.05, 0, 0), 0);        /* end of a disulfide */
     assert_int_equal(shaped("S", 2, 1.81, 1.79, 101), 0);   /* thioether */
-    assert_int_equal(shaped("P", 1, 1.6, 0, 0), -1);
+    assert_int_equal(shaped("P", 1, 1.6, 0, 0), 0);
     assert_int_equal(shaped("CL", 1, 1.74, 0, 0), -1);
 }
 
@@ -187,17 +178,168 @@ static void test_sources(void **state) {
     assert_true(radius_of("ALA", "CA", "", 1, OV_UNITED_NONE) == -1);
 }
 
-/* More hydrogens take more room; nothing is smaller than an atom or larger than a molecule. */
-static void test_radii_grow_with_hydrogens(void **state) {
+/* No radius is smaller than the bare atom's (Bondi), none larger than that of a whole methane. */
+static void test_radii_are_plausible(void **state) {
     (void)state;
-    for (size_t i = 0; i < ov_united_elements_count; i++) {
-        const ov_united_element *row = &ov_united_elements[i];
-        assert_in_range(row->count, 1, OV_UNITED_MOST);
-        assert_in_range(row->usual, 0, row->count - 1);
-        assert_true(row->radii[0] > 1.3 && row->radii[row->count - 1] < 2.6);
-        for (int h = 1; h < row->count; h++)
-            assert_true(row->radii[h] > row->radii[h - 1]);
+    const struct {
+        const char *element;
+        int most;
+        double bare;
+    } known[] = {{"C", 4, 1.7}, {"N", 4, 1.55}, {"O", 2, 1.52},
+                 {"P", 0, 1.8}, {"S", 2, 1.8},  {"SE", 1, 1.9}};
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        for (int h = 0; h <= known[i].most; h++) {
+            double radius = radius_of("", "", known[i].element, h, OV_UNITED_ATOM);
+            assert_true(radius >= known[i].bare && radius < 2.6);
+            if (h > 0)
+                assert_true(radius >= radius_of("", "", known[i].element, 0, OV_UNITED_ATOM));
+        }
+    for (size_t i = 0; i < ov_united_elements_count; i++)
+        assert_in_range(ov_united_elements[i].usual, 0, ov_united_elements[i].count - 1);
+}
+
+/* ---- a protein ---------------------------------------------------------------------------- */
+
+#define FAS2 "/usr/share/apbs/examples/misc/fas2.pqr"
+#define DNA "/usr/share/apbs/examples/bem-binding-energy/test_proteins/1d30.pqr"
+enum { ATOMS_MOST = 1000, BONDS_MOST = 8 };
+
+typedef struct atom {
+    char name[8], residue[8], element[2];
+    double place[3];
+    int hydrogens; /* bonded */
+} atom;
+
+static double between(const atom *a, const atom *b) {
+    return sqrt(pow(a->place[0] - b->place[0], 2) + pow(a->place[1] - b->place[1], 2) +
+                pow(a->place[2] - b->place[2], 2));
+}
+
+/* Atoms of the file, each with how many hydrogens are bonded to it. */
+static size_t read_atoms(const char *path, atom *atoms) {
+    FILE *file = fopen(path, "r");
+    if (!file)
+        skip();
+    char line[256];
+    size_t count = 0;
+    while (fgets(line, sizeof line, file) && count < ATOMS_MOST) {
+        atom *a = &atoms[count];
+        *a = (atom){.hydrogens = 0};
+        if (sscanf(line, "ATOM %*d %7s %7s %*d %lf %lf %lf", a->name, a->residue, &a->place[0],
+                   &a->place[1], &a->place[2]) == 5) {
+            a->element[0] = a->name[0];
+            count++;
+        }
     }
+    fclose(file);
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < count; k++)
+            atoms[i].hydrogens += atoms[k].element[0] == 'H' && between(&atoms[i], &atoms[k]) < 1.4;
+    return count;
+}
+
+static int by_shape(const atom *atoms, size_t count, size_t i) {
+    double others[BONDS_MOST][3];
+    size_t bonds = 0;
+    for (size_t k = 0; k < count && bonds < BONDS_MOST; k++) {
+        bool wide = atoms[i].element[0] == 'S' || atoms[k].element[0] == 'S';
+        if (k == i || atoms[k].element[0] == 'H' ||
+            between(&atoms[i], &atoms[k]) > (wide ? OV_UNITED_BOND_LONG : OV_UNITED_BOND))
+            continue;
+        memcpy(others[bonds++], atoms[k].place, sizeof others[0]);
+    }
+    return ov_united_hydrogens_of_shape(atoms[i].element, atoms[i].place, bonds,
+                                        (const double(*)[3])others);
+}
+
+/* How many heavy atoms there are, for how many the table or their shape tell how many hydrogens
+ * they have, and for how many that is true. */
+typedef struct tally {
+    size_t heavy, known, same, alike;
+} tally;
+
+static tally tally_of(const char *path) {
+    static atom atoms[ATOMS_MOST];
+    size_t count = read_atoms(path, atoms);
+    tally t = {0};
+    for (size_t i = 0; i < count; i++) {
+        if (atoms[i].element[0] == 'H')
+            continue;
+        int table = ov_united_hydrogens(atoms[i].residue, atoms[i].name, 0);
+        t.heavy++;
+        t.known += table >= 0;
+        t.same += table == atoms[i].hydrogens;
+        t.alike += by_shape(atoms, count, i) == atoms[i].hydrogens;
+    }
+    print_message("%zu heavy atoms: %zu in the table, %zu of them right; %zu right by shape\n",
+                  t.heavy, t.known, t.same, t.alike);
+    return t;
+}
+
+/* The file's geometry is strained: some of its hydroxyls' bonds are as long as those of ethers. */
+static void test_hydrogens_of_a_protein(void **state) {
+    (void)state;
+    tally t = tally_of(FAS2);
+    assert_int_equal(t.heavy, 464);
+    assert_int_equal(t.known, 460); /* two odd residues are the ends of the chain */
+    assert_int_equal(t.same, t.known);
+    assert_true(t.alike >= 450);
+}
+
+/* A dodecamer with a drug, which the table does not know. */
+static void test_hydrogens_of_dna(void **state) {
+    (void)state;
+    tally t = tally_of(DNA);
+    assert_int_equal(t.heavy, 507);
+    assert_true(t.known >= 400);
+    assert_int_equal(t.same, t.known);
+    assert_true(t.alike >= 500);
+}
+
+static void measure_fas2(ovoid_context *context, const double *xyzr, size_t heavy,
+                         const ovoid_ellipsoid *all, size_t count, ovoid_measures *measures) {
+    ovoid_molecule *molecule = NULL;
+    ovoid_model *model = NULL;
+    ovoid_measure_options options;
+    ovoid_measure_options_init(&options);
+    options.distances = false;
+    test_check(context, ovoid_molecule_create(context, xyzr, heavy, &molecule));
+    test_check(context, ovoid_model_create(context, all, count, 0.5, 1.0, &model));
+    test_check(context, ovoid_measure(context, molecule, model, &options, measures));
+    ovoid_molecule_destroy(&molecule);
+    ovoid_model_destroy(&model);
+}
+
+/* Heavy atoms with united radii have the area and the volume of all atoms with Bondi radii. The
+ * hydrogens of this file stand further out than those the radii were calibrated with. */
+static void test_surface_of_a_protein(void **state) {
+    ovoid_context *context = *state;
+    static atom atoms[ATOMS_MOST];
+    static double united[4 * ATOMS_MOST];
+    static ovoid_ellipsoid all[ATOMS_MOST];
+    size_t count = read_atoms(FAS2, atoms), heavy = 0;
+    for (size_t i = 0; i < count; i++) {
+        const atom *a = &atoms[i];
+        char e = a->element[0];
+        double bondi = e == 'H' ? 1.2 : e == 'C' ? 1.7 : e == 'N' ? 1.55 : e == 'O' ? 1.52 : 1.8;
+        const double *x = a->place;
+        all[i] = (ovoid_ellipsoid){
+            exp(0.5 * bondi * bondi), {0.5, 0.5, 0.5}, {x[0], x[1], x[2]}, {0, 0, 0}};
+        if (e == 'H')
+            continue;
+        memcpy(united + 4 * heavy, x, sizeof a->place);
+        int hydrogens = ov_united_hydrogens(a->residue, a->name, 0);
+        if (hydrogens < 0)
+            hydrogens = by_shape(atoms, count, i);
+        assert_int_equal(ov_united_radius("", "", a->element, hydrogens, united + 4 * heavy++ + 3),
+                         OV_UNITED_ATOM);
+    }
+    ovoid_measures got;
+    measure_fas2(context, united, heavy, all, count, &got);
+    print_message("area %.1f of %.1f, volume %.1f of %.1f\n", got.area.original, got.area.sparse,
+                  got.volume.original, got.volume.sparse);
+    assert_true(fabs(got.area.original / got.area.sparse - 1) < 0.01);
+    assert_true(fabs(got.volume.original / got.volume.sparse - 1) < 0.012);
 }
 
 int main(void) {
@@ -208,6 +350,9 @@ int main(void) {
                                        cmocka_unit_test(test_shapes),
                                        cmocka_unit_test(test_tetrahedral_shapes),
                                        cmocka_unit_test(test_sources),
-                                       cmocka_unit_test(test_radii_grow_with_hydrogens)};
-    return cmocka_run_group_tests_name("united", tests, NULL, NULL);
+                                       cmocka_unit_test(test_radii_are_plausible),
+                                       cmocka_unit_test(test_hydrogens_of_a_protein),
+                                       cmocka_unit_test(test_hydrogens_of_dna),
+                                       cmocka_unit_test(test_surface_of_a_protein)};
+    return cmocka_run_group_tests_name("united", tests, test_open, test_close);
 }

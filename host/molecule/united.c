@@ -100,10 +100,12 @@ static int carbon(const double at[3], size_t neighbours, const double (*others)[
         return first > 1.4 ? 3 : first > 1.25 ? 2 : 1; /* single, double, triple bond */
     if (neighbours == 2) {
         double angle = angle_of(at, others[0], others[1]);
+        double mean = (first + length_of(at, others[1])) / 2;
+        /* Aromatic bonds measure 1.32 to 1.40, single ones 1.43 (to oxygen) and more. Angles alone
+         * tell less: those of CH2 reach 120 degrees where a structure is strained. */
         if (angle > 155)
             return 0;
-        /* Aromatic bonds measure 1.32 to 1.40, single ones 1.43 (to oxygen) and more. */
-        return angle > 118 || (first + length_of(at, others[1])) / 2 < 1.42 ? 1 : 2;
+        return mean < 1.42 || (angle > 118 && mean < 1.46) ? 1 : 2;
     }
     return neighbours == 3 && !planar(at, others);
 }
@@ -118,8 +120,11 @@ static int nitrogen(const double at[3], size_t neighbours, const double (*others
         /* A proton on a ring's nitrogen widens its angle: in rings of five from 105 to 108 degrees,
          * of six from 117 to 124. */
         double angle = angle_of(at, others[0], others[1]);
-        if ((first + length_of(at, others[1])) / 2 > 1.44)
+        double mean = (first + length_of(at, others[1])) / 2;
+        if (mean > 1.44)
             return 2;
+        if (mean > 1.375) /* a peptide's, with one single bond */
+            return 1;
         return !(angle < 106.5 || (angle > 111 && angle < 120.5));
     }
     return neighbours == 3 && !planar(at, others);
@@ -148,6 +153,8 @@ int ov_united_hydrogens_of_shape(const char *element, const double place[3], siz
         return nitrogen(place, neighbours, others);
     if (strcasecmp(element, "O") == 0)
         return oxygen(place, neighbours, others);
+    if (strcasecmp(element, "P") == 0)
+        return 0; /* phosphate */
     return strcasecmp(element, "S") == 0 ? sulfur(place, neighbours, others) : -1;
 }
 

@@ -28,7 +28,7 @@ int ov_united_hydrogens(const char *residue, const char *atom, unsigned ends);
 
 /* The same for an atom of an unknown residue, from its place and the places of all heavy atoms
  * bonded to it (angstrom): a guess by their number, the bonds' lengths and their angles. -1 for
- * elements other than C, N, O and S. */
+ * elements other than C, N, O, P and S. */
 int ov_united_hydrogens_of_shape(const char *element, const double place[3], size_t neighbours,
                                  const double (*others)[3]);
 

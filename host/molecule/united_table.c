@@ -106,11 +106,11 @@ const size_t ov_united_atoms_count = sizeof ov_united_atoms / sizeof ov_united_a
 
 /* Radii in angstrom of an atom that stands for 0, 1, 2 ... hydrogens too. */
 const ov_united_element ov_united_elements[] = {
-    {"C", 5, 1, {1.700, 1.918, 2.060, 2.164, 2.246}},
-    {"N", 5, 1, {1.550, 1.834, 2.003, 2.121, 2.212}},
-    {"O", 3, 0, {1.520, 1.819, 1.993}},
-    {"P", 1, 0, {1.800}},
-    {"S", 3, 0, {1.800, 1.980, 2.105}},
-    {"SE", 2, 0, {1.900, 2.047}},
+    {"C", 5, 1, {1.700, 2.330, 2.254, 2.446, 2.468}},
+    {"N", 5, 1, {1.550, 2.357, 1.996, 1.980, 2.306}},
+    {"O", 3, 0, {1.570, 1.667, 1.942}},
+    {"P", 1, 0, {1.821}},
+    {"S", 3, 0, {1.875, 1.906, 2.105}},
+    {"SE", 2, 0, {1.900, 2.048}},
 };
 const size_t ov_united_elements_count = sizeof ov_united_elements / sizeof ov_united_elements[0];

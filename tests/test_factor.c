@@ -233,6 +233,38 @@ static void random_factor(test_random *random, double x[OV_FACTOR_PARAMETERS]) {
 
 /* Small steps as a fit takes them, large ones, and each kind of change by itself; and the bound is
  * of the size of the motion, or lists would be rebuilt for nothing. */
+/* Decay rates below the bound are raised to it along their own axes, the others stay, and where
+ * none is below not a bit changes. */
+static void least_decay_is_bounded(void **state) {
+    (void)state;
+    test_random random = {44};
+    size_t kept = 0, raised = 0;
+    for (int n = 0; n < 400; ++n) {
+        double x[OV_FACTOR_PARAMETERS], bounded[OV_FACTOR_PARAMETERS];
+        ov_quadric before, after;
+        ovoid_ellipsoid was, is;
+        random_factor(&random, x);
+        const double least = n % 3 ? random_uniform(&random, 0.001, 1.0)
+                                   : ov_factor_least_decay(x) * (1.0 + (n % 2 ? 1e-6 : -1e-6));
+        memcpy(bounded, x, sizeof x);
+        ov_factor_bound_decay(bounded, least);
+        ov_factor_quadric(x, &before);
+        ov_factor_quadric(bounded, &after);
+        ov_ellipsoid_of_quadric(&before, &was);
+        ov_ellipsoid_of_quadric(&after, &is);
+        expect_near(ov_factor_least_decay(x), was.decay[2], 1e-9 * was.decay[0], "the least rate");
+        assert_true(is.decay[2] >= least * (1.0 - 1e-9));
+        for (int k = 0; k < 3; ++k)
+            expect_near(is.decay[k], fmax(was.decay[k], least), 1e-8 * is.decay[0], "a rate");
+        for (int k = 0; k < OV_FACTOR_L; ++k)
+            assert_true(bounded[k] == x[k]);
+        if (was.decay[2] >= least)
+            assert_memory_equal(bounded, x, sizeof x);
+        ++*(was.decay[2] >= least ? &kept : &raised);
+    }
+    assert_true(kept > 50 && raised > 50);
+}
+
 static void motion_is_bounded(void **state) {
     (void)state;
     test_random random = {6};
@@ -321,6 +353,7 @@ int main(void) {
         cmocka_unit_test(nearly_gimbal_lock),
         cmocka_unit_test(axes_along_the_coordinates),
         cmocka_unit_test(nearly_equal_and_very_unequal_axes),
+        cmocka_unit_test(least_decay_is_bounded),
         cmocka_unit_test(motion_is_bounded),
         cmocka_unit_test(motion_between_any_two),
         cmocka_unit_test(motion_in_closed_form),

@@ -76,7 +76,7 @@ static bool report_step(uint32_t step, double misfit, void *user) {
 /* ---- parts ---------------------------------------------------------------------------------- */
 
 /* The longest axis, as 1 / sqrt(decay rate), that a step may make (angstrom). */
-#define WIDTH_MAX 30.0
+#define WIDTH_MAX 50.0
 
 void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t) {
     for (size_t i = 0; i < t->count; ++i)

@@ -93,3 +93,30 @@ double ov_factor_motion(const double from[OV_FACTOR_PARAMETERS],
     const double motion = sqrt(way) + sqrt(growth);
     return isfinite(motion) ? motion : INFINITY;
 }
+
+double ov_factor_least_decay(const double parameters[OV_FACTOR_PARAMETERS]) {
+    ov_quadric quadric;
+    double value[3], axes[3][3];
+    ov_factor_quadric(parameters, &quadric);
+    eigen(quadric.a, value, axes);
+    return value[2];
+}
+
+void ov_factor_bound_decay(double parameters[OV_FACTOR_PARAMETERS], double least) {
+    ov_quadric quadric;
+    double value[3], axes[3][3];
+    const double *const l = parameters + OV_FACTOR_L;
+    const double amplitude = parameters[OV_FACTOR_AMPLITUDE], root = l[0] * l[3] * l[5];
+    ov_factor_quadric(parameters, &quadric);
+    const double half_trace = 0.5 * (quadric.a[0] + quadric.a[3] + quadric.a[5]);
+    if (root * root >= least * half_trace * half_trace)
+        return; /* det A is at most the smallest eigenvalue times (trace / 2)^2 */
+    eigen(quadric.a, value, axes);
+    if (value[2] >= least)
+        return;
+    for (int k = 0; k < 3; ++k)
+        value[k] = fmax(value[k], least);
+    ov_quadratic_form(axes, value, quadric.a);
+    ov_factor_of_quadric(&quadric, parameters);
+    parameters[OV_FACTOR_AMPLITUDE] = amplitude; /* through exp() and log() it would be rounded */
+}

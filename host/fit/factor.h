@@ -14,6 +14,13 @@ enum { OV_FACTOR_AMPLITUDE = 0, OV_FACTOR_CENTRE = 1, OV_FACTOR_L = 4, OV_FACTOR
 void ov_factor_of_quadric(const ov_quadric *quadric, double parameters[OV_FACTOR_PARAMETERS]);
 void ov_factor_quadric(const double parameters[OV_FACTOR_PARAMETERS], ov_quadric *quadric);
 
+/* Smallest eigenvalue of A, the decay rate along the longest axis. */
+double ov_factor_least_decay(const double parameters[OV_FACTOR_PARAMETERS]);
+
+/* Shortens axes, 1 / sqrt(decay), so that no decay rate is below `least`; leaves the bits of those
+ * that have none. */
+void ov_factor_bound_decay(double parameters[OV_FACTOR_PARAMETERS], double least);
+
 /* The paper's parameters, decay rates in descending order. */
 void ov_ellipsoid_of_quadric(const ov_quadric *quadric, ovoid_ellipsoid *ellipsoid);
 

@@ -132,8 +132,9 @@ ovoid_status ov_refine_evaluate(ov_refiner *r, const ov_target *target, const do
     return evaluate(r, &r->now, target, x, count, misfit);
 }
 
-/* The step shortened ellipsoid by ellipsoid, and L kept away from singular. */
-static void take_step(const double *x, const double *step, size_t count, double factor_min,
+/* The step shortened ellipsoid by ellipsoid. No axis becomes longer than width_max, nor than the
+ * ellipsoid's longest where that is longer already, as in models of a few for a large molecule. */
+static void take_step(const double *x, const double *step, size_t count, double width_max,
                       double *trial) {
     for (size_t i = 0; i < count; ++i) {
         const double *const from = x + i * OV_FACTOR_PARAMETERS;
@@ -152,9 +153,11 @@ static void take_step(const double *x, const double *step, size_t count, double 
         for (int k = 0; k < OV_FACTOR_PARAMETERS; ++k)
             to[k] = from[k] + scale * by[k];
         static const int diagonal[3] = {OV_FACTOR_L, OV_FACTOR_L + 3, OV_FACTOR_L + 5};
-        for (int k = 0; k < 3; ++k)
-            if (fabs(to[diagonal[k]]) < factor_min)
-                to[diagonal[k]] = copysign(factor_min, to[diagonal[k]]);
+        const double least = fmin(1.0 / (width_max * width_max), ov_factor_least_decay(from));
+        for (int k = 0; k < 3; ++k) /* L away from singular */
+            if (fabs(to[diagonal[k]]) < sqrt(least))
+                to[diagonal[k]] = copysign(sqrt(least), to[diagonal[k]]);
+        ov_factor_bound_decay(to, least);
     }
 }
 
@@ -191,7 +194,7 @@ ovoid_status ov_refine(ov_refiner *r, const ov_target *target, const ov_refine_o
     OV_TRY(ov_refine_evaluate(r, target, x, count, misfit));
     for (uint32_t n = 1; n <= options->steps && small < 2 && damping < DAMPING_MAX; ++n) {
         OV_TRY(find_step(r, target, options, x, damping, fresh));
-        take_step(x, r->step, count, 1.0 / options->width_max, r->trial);
+        take_step(x, r->step, count, options->width_max, r->trial);
         status = evaluate(r, &r->tried, target, r->trial, count, &tried);
         if (status == OVOID_ERROR_NUMERIC) { /* too far out to be a model: as good as rejected */
             status = OVOID_OK;

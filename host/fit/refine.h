@@ -17,7 +17,8 @@ typedef struct ov_refine_options {
     double solver_tolerance;
     double decrease;  /* stops after two steps in a row that gain a smaller share than this */
     double damping;   /* lambda at the start */
-    double width_max; /* angstrom: no axis becomes longer, 1 / sqrt(decay) */
+    double width_max; /* angstrom: no axis, 1 / sqrt(decay), becomes longer than this or than the
+                         ellipsoid's longest was */
     bool (*go_on)(uint32_t step, double misfit, void *user); /* may be NULL */
     void *user;
     bool (*enough)(const double *x, size_t count, void *where); /* asked after steps that were

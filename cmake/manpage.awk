@@ -34,7 +34,7 @@ function typed(text) {
 function leave() {
     if (--depth > 0) {
         print ".RE"
-        print ".IP"
+        resumed = 1
     }
 }
 
@@ -45,11 +45,15 @@ function line(column, text,   gap) {
         leave()
     gap = match(text, /   *[^ ]/)
     if (depth > 0 && !gap) {
+        if (resumed) # after entries within the meaning
+            print ".IP"
+        resumed = 0
         print prose(text)
         return
     }
     if (depth > 0)
         print ".RS"
+    resumed = 0
     at[++depth] = column
     print ".TP"
     print typed(gap ? substr(text, 1, gap - 1) : text)

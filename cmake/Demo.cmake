@@ -1,6 +1,6 @@
 # `cmake --workflow --preset demo`, or the target `demo`: fits a real molecule and says what it does.
-set(OVOID_DEMO_MOLECULE /usr/share/apbs/examples/misc/fas2.pqr CACHE FILEPATH
-  "Molecule of the target demo (this one comes with Debian's package apbs-data)")
+set(OVOID_DEMO_MOLECULE /usr/share/pymol/data/tut/1hpv.pdb CACHE FILEPATH
+  "Molecule of the target demo (this one comes with Debian's package pymol-data)")
 # Short names for the reader, where the build is in the source folder.
 cmake_path(RELATIVE_PATH PROJECT_BINARY_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR}
   OUTPUT_VARIABLE demo_build)

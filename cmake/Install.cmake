@@ -1,5 +1,5 @@
 # What `cmake --install` gives: the library, its header, a CMake package and a pkg-config file that
-# can be moved together, the licence and the manual page. The tool installs itself (host/cli).
+# can be moved together, and the licence. The tool installs itself (host/cli).
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ovoid)
@@ -38,4 +38,3 @@ configure_file(${PROJECT_SOURCE_DIR}/cmake/ovoid.pc.in ${PROJECT_BINARY_DIR}/ovo
 install(FILES ${PROJECT_BINARY_DIR}/ovoid.pc DESTINATION ${pc_dir})
 
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(FILES ${PROJECT_SOURCE_DIR}/docs/ovoid.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)

@@ -8,12 +8,14 @@ folder=$3
 
 if [ ! -r "$molecule" ]; then
     echo "The demo fits $molecule, which is not there." >&2
-    echo "Install Debian's package apbs-data, or name another PQR file:" >&2
+    echo "Install Debian's package pymol-data, or name another PDB, mmCIF, PQR or XYZR file:" >&2
     echo "  cmake --preset demo -DOVOID_DEMO_MOLECULE=FILE && cmake --build --preset demo" >&2
     exit 1
 fi
 mkdir -p "$folder"
-name=$(basename "$molecule" .pqr)
+file=$(basename "$molecule")
+name=${file%.gz}
+name=${name%.*}
 model=$folder/$name.ovoid
 report=$folder/$name.json
 trace=$folder/$name.csv
@@ -28,7 +30,7 @@ an angstrom.
 
 The file is $molecule. The command is
 
-  ovoid fit $name.pqr -o $name.ovoid --report $name.json --trace $name.csv
+  ovoid fit $file -o $name.ovoid --report $name.json --trace $name.csv
 
 END
 code=0
@@ -61,5 +63,5 @@ END
 head -n 12 "$model" | awk '{ print (length > 96 ? substr($0, 1, 92) " ..." : $0) }'
 cat <<END
 
-Next: your own molecule, with $ovoid fit FILE.pqr
+Next: your own molecule, with $ovoid fit FILE, a PDB, mmCIF, PQR or XYZR file
 END

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Runs the demo and puts what it prints, the list of devices, and the example program into README.md.
-# For a change that alters any of them.
+# Puts the list of devices, the example program, and what the commands of README.md and docs/guide.md
+# print into them. For a change that alters any of these.
 set -eu
 cd "$(dirname "$0")/.."
 work=$(mktemp -d)
@@ -22,8 +22,8 @@ replace() {
 }
 
 cmake --workflow --preset demo >"$work/log" || { cat "$work/log"; exit 1; }
-sed -n '/^The file is /,$p' "$work/log" >"$work/demo"
 build/demo/ovoid devices >"$work/devices"
-replace 'demo output' "$work/demo"
 replace 'devices output' "$work/devices"
 replace 'consumer.c' tests/consumer/consumer.c
+sh docs/follow.sh --update build/demo/ovoid README.md
+sh docs/follow.sh --update build/demo/ovoid docs/guide.md

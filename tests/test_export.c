@@ -216,8 +216,8 @@ static void pymol_script_draws_the_ellipsoids(void **state) {
     scratch_write(driver, stand_in, sizeof stand_in - 1);
     free(export_text(*state, model, "the m.py", NULL));
     snprintf(command, sizeof command, "python3 '%s' '%s' 2>&1", driver, path);
-    char *text = output_of(command), *at = text + 5;
-    assert_memory_equal(text, "the_m", 5);
+    char *text = output_of(command), *at = text + 16;
+    assert_memory_equal(text, "the_m_ellipsoids", 16);
     static const double head[] = {25, 1, 6, 0.3, 0.55, 0.8};
     for (size_t i = 0; i < sizeof head / sizeof *head; i++)
         expect_near(take_number(&at), head[i], 1e-6, "alpha and colour");
@@ -249,7 +249,7 @@ static void pymol_opens_it(void **state) {
         skip();
     }
     static const char show[] = "from pymol import cmd\n"
-                               "print('EXTENT', *sum(cmd.get_extent('m'), []))\n";
+                               "print('EXTENT', *sum(cmd.get_extent('m_ellipsoids'), []))\n";
     /* Semi-axes 4, 2 and 1: PyMOL bounds an ellipsoid by the sphere about it. */
     const ovoid_ellipsoid e = {exp(1.0), {1 / 16.0, 0.25, 1.0}, {10, -20, 30}, {0.3, 0.5, -0.7}};
     ovoid_model *model = NULL;

@@ -69,8 +69,8 @@ void cli_export_help(FILE *stream) {
           "\n"
           "Files:\n"
           "  -o, --output FILE   where it goes, - for standard output\n"
-          "  --as NAME           what to write when the extension does not say: bild, cxc, pymol,\n"
-          "                      gmm, json, ccp4 or dx\n",
+          "  --as bild|cxc|pymol|gmm|json|ccp4|dx\n"
+          "                      what to write when the extension does not say\n",
           stream);
     reading_help(stream, true);
     fputs("\n"

@@ -49,7 +49,7 @@ static void print_running(const ovoid_fit_options *defaults, FILE *stream) {
              "surface, or l1, Algorithm 1 of Gui, Chen and Lu, arXiv:1909.09095, which needs more "
              "ellipsoids and more time (default %s)",
              fit_method_name(defaults->method));
-    cli_option_help("--method NAME", text, stream);
+    cli_option_help("--method adaptive|l1", text, stream);
     cli_option_help("--profile", CLI_HELP_PROFILE " during the fit", stream);
     cli_option_help("-q, --quiet", "print errors, and a goal that was not reached, only", stream);
     cli_option_help("-h, --help", "show this help", stream);
@@ -102,13 +102,13 @@ static void print_l1(const ovoid_fit_options *defaults, FILE *stream) {
              "(stays where it is and as wide, only its amplitude moves: the sparse RBF model in "
              "Table 1 of the paper) (default %s)",
              fit_kernel_name(defaults->l1.kernel));
-    cli_option_help("--kernel NAME", text, stream);
+    cli_option_help("--kernel ellipsoid|sphere", text, stream);
     print_numbers(fit_l1_numbers, fit_l1_count, defaults, stream);
     snprintf(text, sizeof text,
              "line search: what is tried first, secant (the inverse curvature along the last step, "
              "where it is defined) or grow (default %s)",
              fit_first_step_name(defaults->l1.first_step));
-    cli_option_help("--first-step NAME", text, stream);
+    cli_option_help("--first-step secant|grow", text, stream);
     fprintf(stream, "\nWith --iterations alone, --sparse-iterations keeps its share of %.3g %%.\n",
             100.0 * defaults->l1.sparse_iterations / defaults->l1.iterations);
 }

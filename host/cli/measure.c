@@ -47,10 +47,10 @@ void cli_measure_help(FILE *stream) {
     fputs("Usage: ovoid measure MOLECULE MODEL [OPTION]...\n"
           "\n"
           "Compares the surface of a molecule (PDB, mmCIF, PQR or XYZR, also compressed with\n"
-          "gzip) with that of a model that 'ovoid fit' made of it: areas, volumes, distances in "
-          "both directions\n"
-          "from the points of one surface to the triangles of the other, and connected pieces.\n"
-          "The outer surface is what is left without the walls of cavities.\n"
+          "gzip) with that of a model that 'ovoid fit' made of it: areas, volumes, distances\n"
+          "in both directions from the points of one surface to the triangles of the other,\n"
+          "and connected pieces. The outer surface is what is left without the walls of\n"
+          "cavities.\n"
           "\n"
           "Files:\n"
           "  --report FILE       write the measures as JSON, - for standard output\n"
@@ -63,16 +63,19 @@ void cli_measure_help(FILE *stream) {
           "Running:\n" CLI_HELP_RUNNING "  --profile           " CLI_HELP_PROFILE "\n"
           "\n"
           "The surfaces:\n"
-          "  --isovalue X[,X]... measure where the fields have these values (default: the\n"
-          "                      model's)\n",
+          "  --isovalue X[,X]...\n"
+          "                          measure where the fields have these values (default: the\n"
+          "                          model's)\n",
           stream);
     cli_number_help(&spacing_number, &defaults, stream);
     fprintf(
         stream,
-        "  --vertices NAME     exact: vertices on the surface, areas and volumes of the smooth\n"
-        "                      surface between them; linear: vertices where the field,\n"
-        "                      interpolated linearly, has the isovalue, areas and volumes of\n"
-        "                      the flat triangles, as isosurface programs do (default %s)\n"
+        "  --vertices exact|linear\n"
+        "                          exact: vertices on the surface, areas and volumes of the "
+        "smooth\n"
+        "                          surface between them; linear: vertices where the field,\n"
+        "                          interpolated linearly, has the isovalue, areas and volumes of\n"
+        "                          the flat triangles, as isosurface programs do (default %s)\n"
         "\n"
         "Examples:\n"
         "  ovoid measure molecule.pqr molecule.ovoid\n"

@@ -61,9 +61,10 @@ void cli_mesh_help(FILE *stream) {
     for (size_t i = 0; i < NUMBER_COUNT; i++)
         cli_number_help(&numbers[i], &defaults, stream);
     fprintf(stream,
-            "  --vertices NAME     exact: on the surface; linear: where the field, interpolated\n"
-            "                      linearly between lattice points, has the isovalue, as\n"
-            "                      isosurface programs do (default %s)\n"
+            "  --vertices exact|linear\n"
+            "                          exact: on the surface; linear: where the field,\n"
+            "                          interpolated linearly between lattice points, has the\n"
+            "                          isovalue, as isosurface programs do (default %s)\n"
             "\n"
             "Examples:\n"
             "  ovoid mesh molecule.pqr -o molecule.ply\n"

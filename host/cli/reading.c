@@ -78,13 +78,13 @@ bool reading_parse(reading *r, int option, const char *value) {
 
 void reading_help(FILE *stream, bool models) {
     fputs("\nReading a molecule:\n", stream);
-    cli_option_help("--format NAME",
-                    models ? "pdb, mmcif, pqr, xyzr or ovoid, which is a model (default: by its "
+    cli_option_help(models ? "--format pdb|mmcif|pqr|xyzr|ovoid" : "--format pdb|mmcif|pqr|xyzr",
+                    models ? "how the file is written; ovoid is a model (default: by its "
                              "extension, else by its contents; standard input is a model)"
-                           : "pdb, mmcif, pqr or xyzr (default: by its extension, else by its "
+                           : "how the file is written (default: by its extension, else by its "
                              "contents)",
                     stream);
-    cli_option_help("--radii NAME|FILE",
+    cli_option_help("--radii bondi|paper|united|FILE",
                     "bondi or paper (by element), united (of heavy atoms that also stand for the "
                     "hydrogens that the file lacks), or a file with lines 'residue atom radius' or "
                     "'element radius' (default: those of the file, PQR or XYZR; of a structure "
@@ -95,7 +95,7 @@ void reading_help(FILE *stream, bool models) {
                     "(residues), (ALA), [!C] (elements), ;polymer",
                     stream);
     cli_option_help("--model N", "the model of this number (default: the first)", stream);
-    cli_option_help("--assembly ID",
+    cli_option_help("--assembly ID|list",
                     "this assembly that the file describes, all its copies; 'list' prints which "
                     "there are, and does nothing else (default: the atoms as they are in the file)",
                     stream);

@@ -34,5 +34,6 @@ void ov_write_pymol(const ovoid_model *model, const ov_drawing *drawing, FILE *s
         ov_solid_of_ellipsoid(&ellipsoids[i], drawing->isovalue, &s);
         write_ellipsoid(&s, stream);
     }
-    fprintf(stream, "]\ncmd.load_cgo(ellipsoids, '%s')\n", drawing->title);
+    /* The structure often has the same name, and an object of that name would be replaced. */
+    fprintf(stream, "]\ncmd.load_cgo(ellipsoids, '%s_ellipsoids')\n", drawing->title);
 }

@@ -2,16 +2,9 @@
  * Molecules: lines that PQR and XYZR files really hold, where errors point, line endings, gzip,
  * standard input, and files that are no molecules at all.
  */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "molecule/fields.h"
 #include "molecule/text.h"
-#include "ovoid/ovoid.h"
+#include "reading.h"
 
 #include <float.h>
 #include <locale.h>
@@ -31,31 +24,6 @@
 #define TEXT(literal) literal, sizeof(literal) - 1
 
 /* ---- scratch files ------------------------------------------------------------------------ */
-
-static ovoid_context *context;
-static char folder[64];
-static char warnings[1024]; /* of the last read, one per line */
-
-static void keep_warning(const char *text, void *user) {
-    (void)user;
-    size_t used = strlen(warnings);
-    snprintf(warnings + used, sizeof warnings - used, "%s\n", text);
-}
-
-static int begin(void **state) {
-    (void)state;
-    strcpy(folder, "/tmp/ovoid-molecule-XXXXXX");
-    if (!mkdtemp(folder) || ovoid_context_create(&context) != OVOID_OK)
-        return -1;
-    ovoid_context_on_warning(context, keep_warning, NULL);
-    return 0;
-}
-
-static int finish(void **state) {
-    (void)state;
-    ovoid_context_destroy(&context);
-    return rmdir(folder);
-}
 
 /* Path of a file of this name in the scratch folder; valid until the next call. */
 static const char *path_of(const char *name) {

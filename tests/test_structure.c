@@ -2,15 +2,8 @@
  * Structures: PDB and mmCIF files, models, waters, alternate locations, selections, who the atoms
  * are, their radii, assemblies, and files that are damaged or mean harm.
  */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "molecule/structure.h"
-#include "ovoid/ovoid.h"
+#include "reading.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -20,29 +13,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
-static ovoid_context *context;
-static char folder[64], path[128], warnings[2048];
-
-static void keep_warning(const char *text, void *user) {
-    (void)user;
-    const size_t used = strlen(warnings);
-    snprintf(warnings + used, sizeof warnings - used, "%s\n", text);
-}
-
-static int begin(void **state) {
-    (void)state;
-    strcpy(folder, "/tmp/ovoid-structure-XXXXXX");
-    if (!mkdtemp(folder) || ovoid_context_create(&context) != OVOID_OK)
-        return -1;
-    ovoid_context_on_warning(context, keep_warning, NULL);
-    return 0;
-}
-
-static int finish(void **state) {
-    (void)state;
-    ovoid_context_destroy(&context);
-    return rmdir(folder);
-}
+static char path[128];
 
 static void write_file(const char *name, const char *text, size_t length) {
     snprintf(path, sizeof path, "%s/%s", folder, name);

@@ -102,15 +102,22 @@ double ov_factor_least_decay(const double parameters[OV_FACTOR_PARAMETERS]) {
     return value[2];
 }
 
+/* det A is at most the smallest eigenvalue times (trace / 2)^2, and both come from L: the trace is
+ * the sum of its squares. */
+bool ov_factor_decays_reach(const double parameters[OV_FACTOR_PARAMETERS], double least) {
+    const double *const l = parameters + OV_FACTOR_L;
+    const double root = l[0] * l[3] * l[5];
+    double half_trace = 0.0;
+    for (int k = 0; k < 6; ++k)
+        half_trace += 0.5 * l[k] * l[k];
+    return root * root >= least * half_trace * half_trace;
+}
+
 void ov_factor_bound_decay(double parameters[OV_FACTOR_PARAMETERS], double least) {
     ov_quadric quadric;
     double value[3], axes[3][3];
-    const double *const l = parameters + OV_FACTOR_L;
-    const double amplitude = parameters[OV_FACTOR_AMPLITUDE], root = l[0] * l[3] * l[5];
+    const double amplitude = parameters[OV_FACTOR_AMPLITUDE];
     ov_factor_quadric(parameters, &quadric);
-    const double half_trace = 0.5 * (quadric.a[0] + quadric.a[3] + quadric.a[5]);
-    if (root * root >= least * half_trace * half_trace)
-        return; /* det A is at most the smallest eigenvalue times (trace / 2)^2 */
     eigen(quadric.a, value, axes);
     if (value[2] >= least)
         return;

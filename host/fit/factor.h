@@ -17,6 +17,9 @@ void ov_factor_quadric(const double parameters[OV_FACTOR_PARAMETERS], ov_quadric
 /* Smallest eigenvalue of A, the decay rate along the longest axis. */
 double ov_factor_least_decay(const double parameters[OV_FACTOR_PARAMETERS]);
 
+/* Quick: true only where no decay rate is below `least`; false may mean nothing. */
+bool ov_factor_decays_reach(const double parameters[OV_FACTOR_PARAMETERS], double least);
+
 /* Shortens axes, 1 / sqrt(decay), so that no decay rate is below `least`; leaves the bits of those
  * that have none. */
 void ov_factor_bound_decay(double parameters[OV_FACTOR_PARAMETERS], double least);

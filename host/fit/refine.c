@@ -132,8 +132,18 @@ ovoid_status ov_refine_evaluate(ov_refiner *r, const ov_target *target, const do
     return evaluate(r, &r->now, target, x, count, misfit);
 }
 
-/* The step shortened ellipsoid by ellipsoid. No axis becomes longer than width_max, nor than the
- * ellipsoid's longest where that is longer already, as in models of a few for a large molecule. */
+/* No axis of `to` becomes longer than width_max, nor than the longest of `from` where that is
+ * longer already, as in models of a few for a large molecule. */
+static void bound_axes(const double *from, double width_max, double *to) {
+    static const int diagonal[3] = {OV_FACTOR_L, OV_FACTOR_L + 3, OV_FACTOR_L + 5};
+    const double least = fmin(1.0 / (width_max * width_max), ov_factor_least_decay(from));
+    for (int k = 0; k < 3; ++k) /* L away from singular */
+        if (fabs(to[diagonal[k]]) < sqrt(least))
+            to[diagonal[k]] = copysign(sqrt(least), to[diagonal[k]]);
+    ov_factor_bound_decay(to, least);
+}
+
+/* The step shortened ellipsoid by ellipsoid, and axes bounded. */
 static void take_step(const double *x, const double *step, size_t count, double width_max,
                       double *trial) {
     for (size_t i = 0; i < count; ++i) {
@@ -152,12 +162,8 @@ static void take_step(const double *x, const double *step, size_t count, double 
         const double scale = share > 1.0 ? 1.0 / share : 1.0;
         for (int k = 0; k < OV_FACTOR_PARAMETERS; ++k)
             to[k] = from[k] + scale * by[k];
-        static const int diagonal[3] = {OV_FACTOR_L, OV_FACTOR_L + 3, OV_FACTOR_L + 5};
-        const double least = fmin(1.0 / (width_max * width_max), ov_factor_least_decay(from));
-        for (int k = 0; k < 3; ++k) /* L away from singular */
-            if (fabs(to[diagonal[k]]) < sqrt(least))
-                to[diagonal[k]] = copysign(sqrt(least), to[diagonal[k]]);
-        ov_factor_bound_decay(to, least);
+        if (!ov_factor_decays_reach(to, 1.0 / (width_max * width_max)))
+            bound_axes(from, width_max, to);
     }
 }
 

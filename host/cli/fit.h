@@ -153,6 +153,10 @@ bool fit_batch_check(const fit_job *job);
 /* Fits job->inputs one after the other into job->folder; returns the exit code, all said. */
 int fit_batch(fit_job *job);
 
+/* Of a molecule's exit code: whether there is a model of it, and what became of it in a word. */
+bool fit_made_model(int code);
+const char *fit_status_name(int code);
+
 /* A row each, and how many were fitted, of `asked`. */
 void fit_batch_print(FILE *out, const fit_row *rows, size_t count, size_t asked,
                      const char *folder);

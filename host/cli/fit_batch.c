@@ -19,10 +19,6 @@ typedef struct batch {
 
 /* ---- the report ----------------------------------------------------------------------------- */
 
-static const char *status_name(int code) {
-    return code == CLI_OK ? "done" : code == CLI_GOAL ? "goal not reached" : "failed";
-}
-
 /* All that is known of a molecule whose model was written, and else why there is none. */
 static cJSON *make_line(const fit_job *one, int code) {
     cJSON *line = one->written ? fit_report_make(one) : cJSON_CreateObject();
@@ -30,9 +26,9 @@ static cJSON *make_line(const fit_job *one, int code) {
     if (good && !one->written)
         good = cli_json_string(line, "version", ovoid_version()) &&
                cli_json_string(line, "input", one->input);
-    good = good && cli_json_string(line, "status", status_name(code)) &&
+    good = good && cli_json_string(line, "status", fit_status_name(code)) &&
            cJSON_AddNumberToObject(line, "exit_code", code);
-    if (good && code != CLI_OK && code != CLI_GOAL)
+    if (good && !fit_made_model(code))
         good = cli_json_string(line, "error", cli_last_error());
     if (!good) {
         cJSON_Delete(line);
@@ -157,7 +153,7 @@ static int code_of(const fit_row *rows, size_t count) {
     for (size_t i = 0; i < count; i++) {
         if (rows[i].code == CLI_GOAL)
             goal = CLI_GOAL;
-        if (rows[i].code == CLI_GOAL || rows[i].code == CLI_OK)
+        if (fit_made_model(rows[i].code))
             continue;
         code = failed++ == 0 ? first = rows[i].code : rows[i].code == first ? code : CLI_NONE;
     }
@@ -183,7 +179,7 @@ static int finish(batch *b) {
         own = cli_failure(asked->context, status, CLI_OUTPUT);
     if (cli_interrupted())
         return 128 + cli_interrupted();
-    return own != CLI_OK && (code == CLI_OK || code == CLI_GOAL) ? own : code;
+    return own != CLI_OK && fit_made_model(code) ? own : code;
 }
 
 int fit_batch(fit_job *job) {

@@ -5,6 +5,14 @@
 
 enum { NAME_LEAST = 4, NAME_MOST = 48 };
 
+bool fit_made_model(int code) {
+    return code == CLI_OK || code == CLI_GOAL;
+}
+
+const char *fit_status_name(int code) {
+    return code == CLI_OK ? "done" : code == CLI_GOAL ? "goal not reached" : "failed";
+}
+
 static int name_width(const fit_row *rows, size_t count) {
     size_t width = NAME_LEAST;
     for (size_t i = 0; i < count; i++) {
@@ -30,12 +38,10 @@ static void print_value(FILE *out, int digits, bool known, double value) {
 }
 
 static void print_status(FILE *out, int code) {
-    if (code == CLI_OK)
-        fputs("  done\n", out);
-    else if (code == CLI_GOAL)
-        fputs("  goal not reached\n", out);
-    else
-        fprintf(out, "  failed (%d)\n", code);
+    fprintf(out, "  %s", fit_status_name(code));
+    if (!fit_made_model(code))
+        fprintf(out, " (%d)", code);
+    putc('\n', out);
 }
 
 /* Names may be longer than their column. */
@@ -59,7 +65,7 @@ void fit_batch_print(FILE *out, const fit_row *rows, size_t count, size_t asked,
             width, "file");
     for (size_t i = 0; i < count; i++) {
         print_row(out, &rows[i], width);
-        fitted += rows[i].code == CLI_OK || rows[i].code == CLI_GOAL;
+        fitted += fit_made_model(rows[i].code);
     }
     fprintf(out, "%zu of %zu molecule%s fitted, models in %s", fitted, asked, asked == 1 ? "" : "s",
             folder);

@@ -42,7 +42,6 @@ ovoid_status ov_reader_add(ov_reader *reader, const ov_line *line, const ov_fiel
                                 *fields[i]->text == '*' ? "too wide for its column" : what);
     }
     molecule->atoms++;
-    molecule->counts.zero_radius += atom[3] == 0;
     return OVOID_OK;
 }
 
@@ -405,6 +404,13 @@ static void *trimmed(void *array, size_t count, size_t size) {
     return exact ? exact : array;
 }
 
+/* When all radii are known: of a structure they come last. */
+static void count_zero_radii(ovoid_molecule *molecule) {
+    molecule->counts.zero_radius = 0;
+    for (size_t i = 0; i < molecule->atoms; i++)
+        molecule->counts.zero_radius += molecule->xyzr[4 * i + 3] == 0;
+}
+
 /* Gives back what the geometric growth left over. */
 static void trim(ovoid_molecule *m) {
     m->xyzr = trimmed(m->xyzr, m->atoms, 4 * sizeof *m->xyzr);
@@ -468,6 +474,7 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
     OV_TRY(ov_text_open(context, path, &reader.text));
     OV_TRY(read_text(&reader, reader.guess ? format_by_name(path) : options.format));
     trim(reader.molecule);
+    count_zero_radii(reader.molecule);
     OV_TRY(ov_molecule_doubts(context, ov_text_name(reader.text), reader.molecule));
     reader.molecule->counts.atoms = ovoid_molecule_atoms(reader.molecule);
     reader.molecule->counts.unit_atoms = reader.molecule->atoms;
@@ -499,7 +506,6 @@ ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, s
                        molecule ? "xyzr" : "molecule");
     if (atoms == 0)
         return ov_fail(context, OVOID_ERROR_EMPTY, "ovoid_molecule_create: no atoms");
-    uint64_t zeros = 0;
     for (size_t i = 0; i < atoms; i++) {
         for (size_t k = 0; k < 4; k++) {
             const char *what = fault(k, xyzr[4 * i + k]);
@@ -508,7 +514,6 @@ ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, s
                                "ovoid_molecule_create: %s of atom %zu (from 0) is %g: %s",
                                axis_names[k], i, xyzr[4 * i + k], what);
         }
-        zeros += xyzr[4 * i + 3] == 0;
     }
     ovoid_molecule *made = ov_alloc(context, 1, sizeof *made, "a molecule");
     if (!made)
@@ -522,7 +527,7 @@ ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, s
     made->atoms = atoms;
     made->counts.atoms = atoms;
     made->counts.unit_atoms = atoms;
-    made->counts.zero_radius = zeros;
+    count_zero_radii(made);
     made->counts.models = 1;
     made->radii = OVOID_RADII_OWN;
     made->model = 1;

@@ -220,13 +220,11 @@ static ovoid_status assign(assignment *a, const ov_sites *sites) {
         OV_TRY(find_ends(a, sites));
         OV_TRY(count_hydrogens(a));
     }
-    m->counts.zero_radius = 0;
     for (size_t i = 0; i < m->atoms; i++) {
         double radius = 0.0;
         bool known = false;
         OV_TRY(find_radius(a, i, &radius, &known));
         m->xyzr[4 * i + 3] = radius;
-        m->counts.zero_radius += radius == 0;
         if (!known)
             OV_TRY(count_guess(a, i, radius));
     }

@@ -428,11 +428,9 @@ cleanup:
 }
 
 static void count_atoms(ovoid_molecule *m) {
-    m->counts.zero_radius = 0;
     for (size_t i = 0; i < m->atoms; i++) {
         m->counts.zero_occupancy += (m->identity[i].flags & OVOID_ATOM_ZERO_OCCUPANCY) != 0;
         m->counts.hydrogens += is_hydrogen(ov_element_find(m->identity[i].element));
-        m->counts.zero_radius += m->xyzr[4 * i + 3] == 0;
     }
 }
 

@@ -1,12 +1,14 @@
 """What the benchmarks written in Python share: finding molecules, running the tool, tables."""
 
 import csv
+import gzip
 import json
 import os
 import subprocess
 import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+PAPER_MESH = ("--vertices", "linear", "--spacing", "0.5")  # as the paper measures surfaces
 
 
 def read_table(path):
@@ -42,6 +44,17 @@ def find(folder, name):
         if os.path.exists(path):
             return path
     return None
+
+
+def read_atoms(path):
+    """x, y, z and radius of the atoms of a PQR or XYZR file, as lists of floats."""
+    with (gzip.open if path.endswith(".gz") else open)(path, "rt", encoding="latin-1") as lines:
+        if ".xyzr" in path:
+            rows = [line.split()[:4] for line in lines if line.strip() and line[0] != "#"]
+        else:
+            rows = [line.split()[-5:] for line in lines if line.startswith(("ATOM", "HETATM"))]
+            rows = [row[:3] + row[4:] for row in rows]
+    return [[float(word) for word in row] for row in rows]
 
 
 def report_of(ovoid, arguments, codes=(0,), seconds=None):

@@ -31,11 +31,13 @@ import concurrent.futures
 import math
 import os
 import random
+import statistics
 import subprocess
 import sys
 import tempfile
 
-from common import find, paper_counts, paper_table, read_table, report_of, short, write_table
+from common import (PAPER_MESH, find, paper_counts, paper_table, read_atoms, read_table, report_of,
+                    short, write_table)
 
 DEFAULTS = {"spacing": 1.25, "padding": 3.0, "epsilon": 0.05, "inside-every": 1,
             "first-step": "secant", "iterations": 8000}
@@ -48,14 +50,6 @@ ERRORS = ("area_error", "volume_error", "hausdorff")
 COLUMNS = ("molecule pose spacing padding epsilon inside-every first-step iterations points "
            "ellipsoids area_error volume_error hausdorff area_error_outer volume_error_outer "
            "hausdorff_outer rms_error max_error").split()
-MESH = ("--vertices", "linear", "--spacing", "0.5")
-
-
-def atoms_of(path):
-    """x, y, z, radius of the atoms of a PQR file: the last five words but the radius is the last."""
-    with open(path, encoding="utf-8") as lines:
-        rows = [line.split() for line in lines if line.startswith(("ATOM", "HETATM"))]
-    return [tuple(map(float, row[-5:-2] + row[-1:])) for row in rows]
 
 
 def rotation(seed):
@@ -72,7 +66,7 @@ def rotation(seed):
 def write_pose(path, pose, into):
     turn = rotation(pose)
     with open(into, "w", encoding="utf-8") as out:
-        for *centre, radius in atoms_of(path):
+        for *centre, radius in read_atoms(path):
             turned = [sum(a * b for a, b in zip(row, centre)) for row in turn]
             out.write("".join(f"{v:.6f} " for v in turned) + f"{radius}\n")
 
@@ -89,7 +83,7 @@ def run(ovoid, path, molecule, pose, setting, folder):
         command += [f"--{key}", str(value)]
     fitted = report_of(ovoid, command)
     try:
-        measured = report_of(ovoid, ["measure", source, model, *MESH], seconds=120)
+        measured = report_of(ovoid, ["measure", source, model, *PAPER_MESH], seconds=120)
     except (subprocess.CalledProcessError, subprocess.TimeoutExpired):
         # An ellipsoid that nothing holds beyond the points may reach a thousand angstroms.
         measured = None
@@ -110,15 +104,9 @@ def key_of(row):
             int(row["iterations"]))
 
 
-def mean(values):
-    values = list(values)
-    return sum(values) / len(values)
-
-
 def spread(values):
-    """Standard deviation of the sample."""
-    middle = mean(values)
-    return math.sqrt(sum((v - middle) ** 2 for v in values) / max(1, len(values) - 1))
+    """Standard deviation of the sample, 0 of one value."""
+    return statistics.stdev(values) if len(values) > 1 else 0.0
 
 
 def summarise(rows, names, limits, counts):
@@ -136,8 +124,9 @@ def summarise(rows, names, limits, counts):
         for name in [n for n in names if n in molecules]:
             own = molecules[name]
             values = [int(row["ellipsoids"]) for row in own]
-            square.append(math.log(mean(values) / counts[name]) ** 2)
-            means = {e: mean(float(row[e]) for row in own) for e in (*ERRORS, "hausdorff_outer")}
+            square.append(math.log(statistics.fmean(values) / counts[name]) ** 2)
+            means = {e: statistics.fmean(float(row[e]) for row in own)
+                     for e in (*ERRORS, "hausdorff_outer")}
             over = [e for e in ERRORS if name in limits and means[e] > limits[name][e]]
             above += over
             for e in ERRORS if name in limits else ():
@@ -147,11 +136,11 @@ def summarise(rows, names, limits, counts):
                 else f"{scale * means[e]:6.2f}       " for e, scale in zip(ERRORS, (100, 100, 1)))
             print(f"{setting[0]:7} {setting[1]:7} {setting[2]:7} {setting[3]:6} {setting[4]:7}"
                   f"{setting[5]:10} "
-                  f"{name:9} {len(own):5} {mean(values):9.1f} ±{spread(values):5.1f} "
+                  f"{name:9} {len(own):5} {statistics.fmean(values):9.1f} ±{spread(values):5.1f} "
                   f"({counts[name]}) {text} {means['hausdorff_outer']:6.2f}   {' '.join(over)}")
-        score = math.sqrt(mean(square))
+        score = math.sqrt(statistics.fmean(square))
         whole = all(name in molecules for name in names)
-        shares = {e: mean(v) for e, v in multiples.items()}
+        shares = {e: statistics.fmean(v) for e, v in multiples.items()}
         passes = whole and shares and setting[5] == DEFAULTS["iterations"] and all(share <= 1.0 for share in shares.values())
         print(f"    root mean square of ln(count / paper): {score:.3f}; errors as multiples of the "
               "paper's, in the mean: " + ", ".join(f"{e} {v:.2f}" for e, v in shares.items())

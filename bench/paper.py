@@ -27,12 +27,12 @@ import subprocess
 import sys
 import tempfile
 
-from common import find, paper_counts, paper_table, read_table, report_of, short, write_table
+from common import (PAPER_MESH, find, paper_counts, paper_table, read_table, report_of, short,
+                    write_table)
 
 STAND_INS = ("pbsam-gly/gly", "pka-lig/bx6_7_lig_apbs", "helix/Membrane-helix-0")
 DECAYS = (0.3, 0.5, 0.7)  # of the paper's figure of sparse ratios
 DECAY = 0.5  # of its tables
-MESH = ("--vertices", "linear", "--spacing", "0.5")
 ISOVALUES = tuple(k / 10 for k in range(4, 20, 2))
 COLUMNS = (
     "molecule atoms kernel decay kernels paper_kernels sparse_ratio points iterations rms_error "
@@ -116,7 +116,7 @@ def row_of(run, fitted, measured, counts, geometry):
 
 
 def measure(arguments, path, model, isovalues=()):
-    command = ["measure", path, model, *MESH]
+    command = ["measure", path, model, *PAPER_MESH]
     if isovalues:
         command += ["--isovalue", ",".join(map(str, isovalues))]
     return report_of(arguments.ovoid, command)

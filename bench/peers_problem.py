@@ -5,9 +5,10 @@ host/fit/adaptive.c lays; the constants below have to follow the ones there. Len
 """
 
 import collections
-import gzip
 
 import numpy
+
+from common import read_atoms
 
 DECAY, ISOVALUE = 0.5, 1.0
 SPACING = 0.7  # OVOID_DEFAULT_SPACING_ADAPTIVE
@@ -30,13 +31,7 @@ Problem = collections.namedtuple("Problem", "xyz low high weight")
 
 def read_molecule(path):
     """x, y, z and radius of the atoms of a PQR or XYZR file."""
-    with (gzip.open if path.endswith(".gz") else open)(path, "rt", encoding="latin-1") as lines:
-        if ".xyzr" in path:
-            rows = [line.split()[:4] for line in lines if line.strip() and line[0] != "#"]
-        else:
-            rows = [line.split()[-5:] for line in lines if line.startswith(("ATOM", "HETATM"))]
-            rows = [row[:3] + row[4:] for row in rows]
-    return numpy.array(rows, dtype=float)
+    return numpy.array(read_atoms(path))
 
 
 # ---- points and targets --------------------------------------------------------------------------

@@ -270,6 +270,33 @@ static void emphasis_is_local(void **state) {
     scene_destroy(&s);
 }
 
+/* Emphasised points follow phi itself again, whatever multiple of it the others follow. */
+static void emphasis_asks_for_phi_itself(void **state) {
+    scene s;
+    const mark middle = {.at = {0.0, 0.0, 0.0}};
+    atoms_scene(&s, *state, 0.5, 1.0, 25);
+    const double reach = test_small() ? 0.97 : 2.93;
+    size_t exact = 0, scaled = 0;
+    test_check(*state, ov_target_scale(*state, &s.target, 1.05));
+    test_check(*state,
+               ov_target_emphasise(*state, &s.target, middle.at, sizeof middle, 1, reach, 2.0));
+    bounds b = read_bounds(&s);
+    for (size_t k = 0; k < s.points; ++k) {
+        const bool within = nearest(&middle, 1, s.xyz + 3 * k) < reach;
+        expect_bounds(&s, &b, k, within ? 1.0 : 1.05);
+        if (b.low[k] == b.high[k])
+            ++*(within ? &exact : &scaled);
+    }
+    assert_true(exact > 0 && scaled > 0);
+    free_bounds(&b);
+    test_check(*state, ov_target_scale(*state, &s.target, 0.98));
+    b = read_bounds(&s);
+    for (size_t k = 0; k < s.points; ++k)
+        expect_bounds(&s, &b, k, 0.98);
+    free_bounds(&b);
+    scene_destroy(&s);
+}
+
 static void emphasis_has_a_limit(void **state) {
     scene s;
     const mark far = {.at = {1e5, 0.0, 0.0}}, middle = {.at = {0.0, 0.0, 0.0}};
@@ -294,10 +321,10 @@ static void emphasis_has_a_limit(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_kind_of_point),      cmocka_unit_test(units_scale),
-        cmocka_unit_test(flat_places_have_a_floor), cmocka_unit_test(windows_weigh_anew),
-        cmocka_unit_test(scales_do_not_add_up),     cmocka_unit_test(emphasis_is_local),
-        cmocka_unit_test(emphasis_has_a_limit),
+        cmocka_unit_test(every_kind_of_point),          cmocka_unit_test(units_scale),
+        cmocka_unit_test(flat_places_have_a_floor),     cmocka_unit_test(windows_weigh_anew),
+        cmocka_unit_test(scales_do_not_add_up),         cmocka_unit_test(emphasis_is_local),
+        cmocka_unit_test(emphasis_asks_for_phi_itself), cmocka_unit_test(emphasis_has_a_limit),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

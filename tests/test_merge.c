@@ -520,6 +520,76 @@ static void fixed_ones_stay_and_parents_are_named(void **state) {
     destroy_model(&m);
 }
 
+/* A half-space, and how often it was asked about. */
+typedef struct border {
+    double x;
+    size_t asked;
+} border;
+
+static bool beyond(const double centre[3], void *user) {
+    border *const b = user;
+    ++b->asked;
+    return centre[0] > b->x;
+}
+
+static double apart(const double *a, const double *b) {
+    double square = 0.0;
+    for (int k = 0; k < 3; ++k)
+        square += (a[k] - b[k]) * (a[k] - b[k]);
+    return sqrt(square);
+}
+
+/* What became of the model as `merging` says; *merged: the centres of those that are two in one. */
+static size_t merged_as(model *m, const ov_merging *merging, double (*merged)[3]) {
+    double *const x = copy_of(m);
+    size_t left = m->count, count = 0;
+    evaluate(m);
+    test_check(m->context,
+               ov_merge_cheapest(&m->refiner, &m->merger, &m->target, x, &left, m->count, merging));
+    for (size_t i = 0; i < left; ++i)
+        if (merging->parents[2 * i + 1] != UINT32_MAX)
+            memcpy(merged[count++], x + i * P + OV_FACTOR_CENTRE, sizeof *merged);
+    assert_int_equal(left, m->count - count);
+    free(x);
+    return count;
+}
+
+/* Merges keep their distance from one another, lie where they may, and are of the cheapest. */
+static void merges_lie_where_they_may(void **state) {
+    model m;
+    const size_t count = test_size(24, 8);
+    border b = {.x = 0.0};
+    create_model(&m, *state, count, test_size(6, 20) / 10.0, 83);
+    uint32_t *const parents = test_alloc(2 * count, sizeof *parents);
+    double(*const centre)[3] = test_alloc(count, sizeof *centre);
+    ov_merging merging = {.parents = parents};
+    const size_t all = merged_as(&m, &merging, centre);
+    double nearest = INFINITY, middle = 0.0;
+    for (size_t i = 0; i < all; ++i) {
+        middle += centre[i][0] / (double)all;
+        for (size_t j = 0; j < i; ++j)
+            nearest = fmin(nearest, apart(centre[i], centre[j]));
+    }
+    merging.apart = 1.5 * nearest;
+    const size_t sparse = merged_as(&m, &merging, centre);
+    for (size_t i = 0; i < sparse; ++i)
+        for (size_t j = 0; j < i; ++j)
+            assert_true(apart(centre[i], centre[j]) >= merging.apart * (1.0 - 1e-6));
+    assert_true(sparse > 0);
+    b.x = middle;
+    merging = (ov_merging){.parents = parents, .allowed = beyond, .user = &b};
+    const size_t half = merged_as(&m, &merging, centre);
+    for (size_t i = 0; i < half; ++i)
+        assert_true(centre[i][0] > b.x - 1e-6);
+    assert_true(half > 0 && half < all && b.asked > half);
+    merging = (ov_merging){.parents = parents, .share = 1e-6}; /* of the pairs: one */
+    assert_int_equal(merged_as(&m, &merging, centre), 1);
+    print_message("%zu merges, %zu apart, %zu on one side\n", all, sparse, half);
+    free(parents);
+    free(centre);
+    destroy_model(&m);
+}
+
 static void nothing_to_merge(void **state) {
     model m;
     create_model(&m, *state, 3, 2.0, 81);
@@ -727,6 +797,7 @@ int main(void) {
         cmocka_unit_test(merging_keeps_moments),
         cmocka_unit_test(cheapest_pairs_are_merged),
         cmocka_unit_test(twins_stay_apart),
+        cmocka_unit_test(merges_lie_where_they_may),
         cmocka_unit_test(nothing_to_merge),
         cmocka_unit_test(fixed_ones_stay_and_parents_are_named),
         cmocka_unit_test(crowd_at_one_point),

@@ -57,6 +57,29 @@ static void merges(void **state) {
     assert_memory_equal(owner, expected, sizeof owner);
 }
 
+/* Atom 1 has drifted away from its ellipsoid, 2 a little, and 3 is all that ellipsoid 1 has. */
+static void drifted_atoms_change_hands(void **state) {
+    const ov_quadric quadrics[3] = {sphere(0.0, 1.0, 0.5), sphere(4.0, 1.0, 0.5),
+                                    sphere(50.0, 9.0, 0.5)};
+    const double xyzr[] = {0.2, 0, 0, 1, 3.5, 0, 0, 1, 2.1, 0, 0, 1, 0.1, 0, 0, 1, 49, 0, 0, 1};
+    uint32_t owner[5] = {0, 0, 0, 1, 2};
+    test_check(*state, ov_owner_tidy(*state, xyzr, 5, quadrics, 3, 0.5, 10.0, owner));
+    /* Atom 3 may leave once ellipsoid 1 has another one. */
+    const uint32_t expected[5] = {0, 1, 0, 0, 2};
+    assert_memory_equal(owner, expected, sizeof owner);
+    const uint32_t alone[5] = {0, 0, 0, 0, 2};
+    memcpy(owner, alone, sizeof owner);
+    owner[1] = 1;
+    test_check(*state, ov_owner_tidy(*state, xyzr, 5, quadrics, 3, 1e-9, 10.0, owner));
+    const uint32_t kept[5] = {0, 1, 0, 0, 2}; /* no one is that far below */
+    assert_memory_equal(owner, kept, sizeof owner);
+    const double swapped[] = {0.1, 0, 0, 1, 0.2, 0, 0, 1, 0.3, 0, 0, 1, 0.2, 0, 0, 1, 49, 0, 0, 1};
+    const uint32_t lone[5] = {1, 0, 0, 0, 2}; /* the last of ellipsoid 1 stays */
+    memcpy(owner, lone, sizeof owner);
+    test_check(*state, ov_owner_tidy(*state, swapped, 5, quadrics, 3, 0.5, 10.0, owner));
+    assert_memory_equal(owner, lone, sizeof owner);
+}
+
 /* The largest value counts, not the nearest centre. */
 static void largest(void **state) {
     (void)state;
@@ -83,6 +106,7 @@ int main(void) {
         cmocka_unit_test(splits),
         cmocka_unit_test(splits_leave_no_half_without),
         cmocka_unit_test(merges),
+        cmocka_unit_test(drifted_atoms_change_hands),
         cmocka_unit_test(largest),
     };
     return cmocka_run_group_tests(tests, open_context, close_context);

@@ -156,10 +156,6 @@ cleanup:
     return status;
 }
 
-static bool may_merge(const ov_merging *how, uint32_t i, uint32_t j) {
-    return !(how->twin && how->twin[i] == j) && !(how->fixed && (how->fixed[i] || how->fixed[j]));
-}
-
 /* Moves those that are left together. partner[i]: whom i took in or was taken in by, UINT32_MAX:
  * nobody; the one with the larger index is gone. */
 static size_t close_gaps(const uint32_t *partner, size_t count, double *x, uint32_t *parents) {
@@ -178,30 +174,78 @@ static size_t close_gaps(const uint32_t *partner, size_t count, double *x, uint3
     return kept;
 }
 
+/* The merges of one call: what became of whom, and where they lie. */
+typedef struct merges {
+    uint32_t *partner; /* as close_gaps() wants it */
+    ov_grid grid;      /* of their centres, where they must lie apart */
+    uint32_t count;
+} merges;
+
+static ovoid_status merges_create(ovoid_context *context, const ov_component *components,
+                                  size_t count, double apart, merges *m) {
+    ovoid_status status = OVOID_OK;
+    *m = (merges){.partner = ov_alloc(context, count, sizeof *m->partner, "merges")};
+    if (!m->partner)
+        return OVOID_ERROR_MEMORY;
+    memset(m->partner, 0xff, count * sizeof *m->partner);
+    if (apart > 0.0) {
+        double low[3], high[3];
+        for (int k = 0; k < 3; ++k)
+            low[k] = high[k] = components[0].mean[k];
+        for (size_t i = 0; i < count; ++i)
+            for (int k = 0; k < 3; ++k) {
+                low[k] = fmin(low[k], components[i].mean[k]);
+                high[k] = fmax(high[k], components[i].mean[k]);
+            }
+        OV_TRY(ov_grid_create(context, low, high, apart, count, count, &m->grid));
+    }
+cleanup:
+    return status;
+}
+
+static void merges_destroy(merges *m) {
+    ov_grid_destroy(&m->grid);
+    free(m->partner);
+}
+
+/* Whether two of the ellipsoids may merge and their merge may lie at the centre. */
+static bool may_merge(const merges *m, const ov_merging *how, uint32_t i, uint32_t j,
+                      const double centre[3]) {
+    uint32_t near[2 * OV_NEAR_MAX];
+    return m->partner[i] == UINT32_MAX && m->partner[j] == UINT32_MAX &&
+           !(how->twin && how->twin[i] == j) && !(how->fixed && (how->fixed[i] || how->fixed[j])) &&
+           !(how->apart > 0.0 && ov_grid_near(&m->grid, centre, UINT32_MAX, near) > 0) &&
+           !(how->allowed && !how->allowed(centre, how->user));
+}
+
 /* Merges the first pairs of the list, no ellipsoid twice, and closes the gaps. */
 static ovoid_status apply_merges(ovoid_context *context, const ov_component *components,
                                  const candidate *list, size_t listed, const ov_merging *how,
                                  double *x, size_t *count, size_t fewer) {
-    uint32_t *const partner = ov_alloc(context, *count, sizeof *partner, "merges");
-    if (!partner)
-        return OVOID_ERROR_MEMORY;
-    memset(partner, 0xff, *count * sizeof *partner);
-    for (size_t n = 0; n < listed && fewer > 0; ++n) {
+    ovoid_status status = OVOID_OK;
+    merges m;
+    if (how->share > 0.0 && how->share < 1.0)
+        listed = (size_t)ceil(how->share * (double)listed);
+    OV_TRY(merges_create(context, components, *count, how->apart, &m));
+    for (size_t n = 0; n < listed && m.count < fewer; ++n) {
         const uint32_t i = list[n].i, j = list[n].j; /* i < j */
-        if (partner[i] != UINT32_MAX || partner[j] != UINT32_MAX || !may_merge(how, i, j))
-            continue;
         ov_component both;
         ov_quadric quadric;
         ov_component_merge(&components[i], &components[j], &both);
+        if (!may_merge(&m, how, i, j, both.mean))
+            continue;
         ov_quadric_of_component(&both, &quadric);
         ov_factor_of_quadric(&quadric, x + i * OV_FACTOR_PARAMETERS);
-        partner[i] = j;
-        partner[j] = i;
-        --fewer;
+        m.partner[i] = j;
+        m.partner[j] = i;
+        if (how->apart > 0.0)
+            OV_TRY(ov_grid_add(context, &m.grid, both.mean, m.count));
+        ++m.count;
     }
-    *count = close_gaps(partner, *count, x, how->parents);
-    free(partner);
-    return OVOID_OK;
+    *count = close_gaps(m.partner, *count, x, how->parents);
+cleanup:
+    merges_destroy(&m);
+    return status;
 }
 
 static ovoid_status components_of(ovoid_context *context, const double *x, size_t count,
@@ -220,7 +264,7 @@ static ovoid_status components_of(ovoid_context *context, const double *x, size_
 
 ovoid_status ov_merge_cheapest(ov_refiner *r, ov_merger *m, const ov_target *target, double *x,
                                size_t *count, size_t fewer, const ov_merging *how) {
-    static const ov_merging anyhow = {NULL, NULL, NULL};
+    static const ov_merging anyhow = {0};
     ovoid_status status = OVOID_OK;
     ov_component *components = NULL;
     candidate *list = NULL;

@@ -18,8 +18,12 @@ void ov_merger_destroy(ov_merger *merger);
 typedef struct ov_merging {
     const uint32_t *twin; /* ellipsoid i is not merged with twin[i] */
     const bool *fixed;    /* and not at all if fixed[i] */
-    uint32_t *parents;    /* gets two for each ellipsoid left: the indices of those that became it,
-                             UINT32_MAX in place of the second where it is one as before */
+    double share;         /* of the pairs looked at: the cheapest; 0: all */
+    double apart;         /* angstrom: the centres of two merges are no nearer than this */
+    bool (*allowed)(const double centre[3], void *user); /* whether a merge may lie there */
+    void *user;
+    uint32_t *parents; /* gets two for each ellipsoid left: the indices of those that became it,
+                          UINT32_MAX in place of the second where it is one as before */
 } ov_merging;
 
 /* Merges pairs, the cheapest first and no ellipsoid twice, until *count has gone down by `fewer` or

@@ -1,7 +1,10 @@
 #include "fit/owner.h"
 
+#include "fit/reduce_cells.h"
+
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* What sharing out the atoms of split ellipsoids takes note of, per ellipsoid. */
 typedef struct half {
@@ -58,6 +61,49 @@ ovoid_status ov_owner_merge(ovoid_context *context, const uint32_t *parents, siz
         owner[i] = place[owner_before[i]];
     free(place);
     return OVOID_OK;
+}
+
+/* The one of those near with the largest value at the point, if that is above *log_value, which
+ * becomes its; otherwise `best`. */
+static uint32_t larger_at(const ov_quadric *quadrics, const uint32_t *near, size_t near_count,
+                          const double at[3], uint32_t best, double *log_value) {
+    for (size_t n = 0; n < near_count; ++n) {
+        const double value = ov_quadric_log_value(&quadrics[near[n]], at);
+        if (value > *log_value) {
+            *log_value = value;
+            best = near[n];
+        }
+    }
+    return best;
+}
+
+ovoid_status ov_owner_tidy(ovoid_context *context, const double *xyzr, size_t atoms,
+                           const ov_quadric *quadrics, size_t count, double share, double reach,
+                           uint32_t *owner) {
+    ovoid_status status = OVOID_OK;
+    ov_grid grid = {0};
+    uint32_t near[2 * OV_NEAR_MAX];
+    size_t *const owned = ov_alloc(context, count, sizeof *owned, "owners");
+    if (!owned)
+        return OVOID_ERROR_MEMORY;
+    memset(owned, 0, count * sizeof *owned);
+    OV_TRY(ov_grid_of(context, quadrics->centre, sizeof *quadrics, count, reach, &grid));
+    for (size_t i = 0; i < atoms; ++i)
+        ++owned[owner[i]];
+    for (size_t i = 0; i < atoms; ++i) {
+        const double *const at = xyzr + 4 * i;
+        double value = ov_quadric_log_value(&quadrics[owner[i]], at) - log(share);
+        const size_t near_count = ov_grid_near(&grid, at, UINT32_MAX, near);
+        const uint32_t best = larger_at(quadrics, near, near_count, at, owner[i], &value);
+        if (owned[owner[i]] > 1) {
+            --owned[owner[i]];
+            ++owned[owner[i] = best];
+        }
+    }
+cleanup:
+    ov_grid_destroy(&grid);
+    free(owned);
+    return status;
 }
 
 uint32_t ov_owner_at(const ov_quadric *quadrics, size_t count, const double at[3]) {

@@ -22,6 +22,13 @@ ovoid_status ov_owner_merge(ovoid_context *context, const uint32_t *parents, siz
                             size_t before, const uint32_t *owner_before, size_t atoms,
                             uint32_t *owner);
 
+/* After many splits and merges: an atom at whose centre its ellipsoid's value has fallen below
+ * `share` of the largest there goes to the ellipsoid with the largest, unless it is the last that
+ * its own has. Only ellipsoids with centres within `reach` (angstrom) of an atom are looked at. */
+ovoid_status ov_owner_tidy(ovoid_context *context, const double *xyzr, size_t atoms,
+                           const ov_quadric *quadrics, size_t count, double share, double reach,
+                           uint32_t *owner);
+
 /* The ellipsoid with the largest value at a point. */
 uint32_t ov_owner_at(const ov_quadric *quadrics, size_t count, const double at[3]);
 

@@ -193,6 +193,61 @@ static void tolerances(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* Ellipsoids of a fit that reaches the tolerance. */
+static size_t needed(ovoid_context *context, const double *xyzr, size_t atoms, double tolerance) {
+    ovoid_molecule *molecule = molecule_of(context, xyzr, atoms);
+    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, tolerance);
+    ovoid_model *model = NULL;
+    ovoid_fit_result result;
+    test_check(context, ovoid_fit(context, molecule, &options, &model, &result));
+    assert_true(result.reached && result.distance <= tolerance);
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
+    return (size_t)result.ellipsoids;
+}
+
+/* A lattice of beads whose windows are all about to close, where hardly two can merge, and far from
+ * it a chain that needs few: the one does not cost the other anything. */
+static void stubborn_places_cost_nobody_else(void **state) {
+    if (test_small())
+        skip();
+    enum { BEADS = 27, CHAIN = 60 };
+    double xyzr[4 * (BEADS + CHAIN)];
+    ovoid_molecule *chain = random_chain(*state, CHAIN, 3);
+    for (size_t i = 0; i < BEADS; ++i) {
+        const double bead[4] = {3.0 * (double)(i % 3), 3.0 * (double)(i / 3 % 3),
+                                3.0 * (double)(i / 9) - 100.0, 1.2};
+        memcpy(xyzr + 4 * i, bead, sizeof bead);
+    }
+    memcpy(xyzr + 4 * BEADS, ovoid_molecule_xyzr(chain), 4 * CHAIN * sizeof *xyzr);
+    ovoid_molecule_destroy(&chain);
+    const size_t beads = needed(*state, xyzr, BEADS, 0.25);
+    const size_t few = needed(*state, xyzr + 4 * BEADS, CHAIN, 0.25);
+    const size_t both = needed(*state, xyzr, BEADS + CHAIN, 0.25);
+    print_message("%zu of %d beads, %zu of %d of a chain, %zu together\n", beads, BEADS, few, CHAIN,
+                  both);
+    assert_true((double)beads > 0.4 * BEADS && (double)few < 0.4 * CHAIN);
+    assert_true((double)both <= 1.2 * (double)(beads + few));
+}
+
+/* No count that is 5 % lower reaches the tolerance when it is asked for by itself. */
+static void no_count_does_better(void **state) {
+    if (test_small())
+        skip();
+    ovoid_molecule *molecule = random_chain(*state, 150, 8);
+    const double tolerance = 0.4;
+    const size_t found = needed(*state, ovoid_molecule_xyzr(molecule), 150, tolerance);
+    for (size_t count = found - 1; count + 6 > found; --count) {
+        const ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, (double)count);
+        outcome o = fit(*state, molecule, &options);
+        print_message("%zu: %.3g, by the search %zu\n", count, o.measures.deviation, found);
+        if ((double)count < 0.98 * (double)found)
+            assert_true(o.measures.deviation > tolerance);
+        ovoid_model_destroy(&o.model);
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
 /* Tighter than any merge allows: in the end the atoms themselves. Without a step of refinement a
  * tolerance may be missed, and the result says so. */
 static void tolerances_out_of_reach(void **state) {
@@ -591,6 +646,8 @@ int main(void) {
         cmocka_unit_test(ratios),
         cmocka_unit_test(owners),
         cmocka_unit_test(tolerances),
+        cmocka_unit_test(stubborn_places_cost_nobody_else),
+        cmocka_unit_test(no_count_does_better),
         cmocka_unit_test(tolerances_out_of_reach),
         cmocka_unit_test(two_atoms_as_one),
         cmocka_unit_test(one_atom),

@@ -137,6 +137,10 @@ ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t) {
     return ov_judge_model(&f->judge, f->quadrics, t->count, &t->judgement);
 }
 
+const ov_reduction_options *ov_adaptive_merging(void) {
+    return &starts[0];
+}
+
 ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial *t) {
     ovoid_status status = OVOID_OK;
     f->stage = "merge";

@@ -81,6 +81,12 @@ ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t);
 
 /* The merged atoms of start `kind` at this count. */
 ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial *t);
+/* How atoms merge at the first start. */
+const ov_reduction_options *ov_adaptive_merging(void);
+/* Goes back to the atoms of the chosen ellipsoids and merges these anew to `factor` times as many
+ * ellipsoids, the atoms themselves at most, in place of the chosen; all stays as it is where the
+ * chosen have no atoms. */
+ovoid_status ov_adaptive_rebuild(ov_adaptive *f, ov_trial *t, double factor, const bool *chosen);
 void ov_adaptive_drop_reductions(ov_adaptive *f);
 /* Refined from the first `kinds` starts, under one window, and with the right volume but for a
  * little. */

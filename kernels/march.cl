@@ -160,6 +160,16 @@ static inline spot move_to_corner(uint brick, uint point, uint corner, uint nx, 
     return p;
 }
 
+/* A vertex keeps this far from the ends of its edge, in lattice steps: where the surface passes
+ * through a lattice point, all its edges have their vertex there, and programs that merge equal
+ * vertices would be left with triangles without area and holes. Three points within three edges of
+ * a box are never on one line, so that apart from these ends no triangle can lose its area. */
+#define EDGE_MARGIN 7.62939453125e-6f /* 2^-17, as in host/surface/march.h */
+
+static inline float keep_within(float t) {
+    return clamp(t, EDGE_MARGIN, 1.0f - EDGE_MARGIN);
+}
+
 /* Where phi is c between a at 0 and b at 1. Interpolates ln phi if `logarithmic`: the start of a
  * search, as ln phi is quadratic about a single atom. */
 static inline float crossing_at(float a, float b, float isovalue, int logarithmic) {
@@ -199,7 +209,7 @@ __kernel void march_vertices(const uint count, __global const uint4 *restrict li
             const uint x = bx * OV_BRICK_X + (point & 3u), y = by * OV_BRICK_Y + (point >> 2 & 1u),
                        z = bz * OV_BRICK_Z + (point >> 3);
             edge[at] = x | y << 7 | z << 14 | axis << 20 | (a >= isovalue ? 1u : 0u) << 22;
-            t[at] = crossing_at(a, b, isovalue, logarithmic);
+            t[at] = keep_within(crossing_at(a, b, isovalue, logarithmic));
         }
 }
 
@@ -320,7 +330,7 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
         gy *= scale;
         gz *= scale;
         const ov_vec length = usable ? one / sqrt(fma(gx, gx, fma(gy, gy, gz * gz))) : zero;
-        OV_STORE(s, place, ts);
+        OV_STORE(clamp(s, (ov_vec)EDGE_MARGIN, (ov_vec)(1.0f - EDGE_MARGIN)), place, ts);
         OV_STORE(usable ? gx * length : zero, place, out);
         OV_STORE(usable ? gy * length : zero, place, out + OV_PACK);
         OV_STORE(usable ? gz * length : zero, place, out + 2 * OV_PACK);

@@ -10,6 +10,7 @@ void ov_body_of_atom(const double xyzr[4], double decay, ov_body *body) {
     ov_quadric_of_atom(xyzr, decay, &body->quadric);
     for (int axis = 0; axis < 3; ++axis)
         body->extent[axis] = 1.0 / sqrt(decay);
+    body->least = 1.0 / sqrt(decay);
 }
 
 /* Half-sides sqrt((A^-1)_kk), from A's own axes: the inverse of a long needle's A is all rounding.
@@ -24,6 +25,13 @@ void ov_body_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_body *body) {
             sum += r[p][axis] * r[p][axis] / ellipsoid->decay[p];
         body->extent[axis] = sqrt(sum);
     }
+    body->least =
+        1.0 / sqrt(fmax(fmax(ellipsoid->decay[0], ellipsoid->decay[1]), ellipsoid->decay[2]));
+}
+
+double ov_body_reach(const ov_body *body, double value) {
+    const double q = log(body->quadric.amplitude / value);
+    return q > 0.0 ? sqrt(q) : -1.0;
 }
 
 /* What a lattice index may be; differences and doubles stay exact far beyond. */
@@ -44,12 +52,6 @@ typedef struct planner {
     size_t pairs;
 } planner;
 
-/* How far a term reaches the value, as a multiple of its extent; negative where it nowhere does. */
-static double reach_of(const ov_body *body, double value) {
-    const double q = log(body->quadric.amplitude / value);
-    return q > 0.0 ? sqrt(q) : -1.0;
-}
-
 static ovoid_status fail_large(ovoid_context *context, double spacing) {
     return ov_fail(context, OVOID_ERROR_LIMIT,
                    "the lattice about the surface is too large for a spacing of %g angstrom; use a "
@@ -62,7 +64,7 @@ static bool bounds(const planner *p, double low[3], double high[3]) {
     bool any = false;
     for (size_t i = 0; i < p->count; ++i) {
         const ov_body *const body = &p->bodies[i];
-        const double reach = reach_of(body, p->threshold);
+        const double reach = ov_body_reach(body, p->threshold);
         if (reach < 0.0)
             continue;
         for (int axis = 0; axis < 3; ++axis) {
@@ -113,7 +115,7 @@ static void piece_range(const ov_pieces *pieces, int axis, double centre, double
 
 static void term_range(const planner *p, const ov_body *body, double value, uint64_t first[3],
                        uint64_t end[3]) {
-    const double reach = reach_of(body, value);
+    const double reach = ov_body_reach(body, value);
     for (int axis = 0; axis < 3; ++axis) {
         first[axis] = end[axis] = 0;
         if (reach >= 0.0)

@@ -87,7 +87,9 @@ static inline uint lowest_bit(uint mask) {
     return 31 - clz(mask & -mask);
 }
 
-/* sign: bit j set where point j of a brick is inside, phi >= c. All bricks of the padded grid. */
+/* sign: bit j set where point j of a brick is inside, phi > c: a point where phi only touches c,
+ * such as the centre of an atom of radius 0, has no surface about it. All bricks of the padded
+ * grid. */
 __kernel void march_signs(const uint bricks, const uint run, const float isovalue,
                           __global const uint *restrict place, __global const float *restrict value,
                           __global uint *restrict sign) {
@@ -96,7 +98,7 @@ __kernel void march_signs(const uint bricks, const uint run, const float isovalu
         __global const float *const v = value + (size_t)place[brick] * OV_PACK;
         uint mask = 0;
         for (uint j = 0; j < OV_PACK; ++j)
-            mask |= (v[j] >= isovalue ? 1u : 0u) << j;
+            mask |= (v[j] > isovalue ? 1u : 0u) << j;
         sign[brick] = mask;
     }
 }
@@ -208,7 +210,7 @@ __kernel void march_vertices(const uint count, __global const uint4 *restrict li
             const float b = value[(size_t)place[end.brick] * OV_PACK + end.point];
             const uint x = bx * OV_BRICK_X + (point & 3u), y = by * OV_BRICK_Y + (point >> 2 & 1u),
                        z = bz * OV_BRICK_Z + (point >> 3);
-            edge[at] = x | y << 7 | z << 14 | axis << 20 | (a >= isovalue ? 1u : 0u) << 22;
+            edge[at] = x | y << 7 | z << 14 | axis << 20 | (a > isovalue ? 1u : 0u) << 22;
             t[at] = keep_within(crossing_at(a, b, isovalue, logarithmic));
         }
 }
@@ -309,7 +311,7 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
             }
             if (step >= steps)
                 break;
-            const ov_ivec beyond = (sum >= isovalue) == low_inside;
+            const ov_ivec beyond = (sum > isovalue) == low_inside;
             from = moving && beyond ? s : from;
             to = moving && !beyond ? s : to;
             const ov_vec slope = fma(gx, ux, fma(gy, uy, gz * uz)) * (M_LN2_F * h);

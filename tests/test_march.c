@@ -477,9 +477,9 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
             expect_near((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2], 1.0, 1e-5,
                         "a normal's square");
         }
-        assert_int_equal(at_origin, 4); /* the origin is inside: on the edges up and down from it */
+        assert_int_equal(at_origin, 2); /* the origin is outside: on the edges to the atoms */
         for (int k = 0; k < 3; ++k)
-            expect_near(sum[k], 0.0, 2.0, "the sum of four normals that face all ways");
+            expect_near(sum[k], 0.0, 2.0, "the sum of two normals that face each other");
         ovoid_mesh_destroy(&mesh);
     }
     ovoid_molecule_destroy(&molecule);
@@ -607,7 +607,7 @@ static void exact_vertices_stay_on_their_edges(void **state) {
 /* ---- lattices ----------------------------------------------------------------------------- */
 
 /* phi is c at many lattice points: a cube of atoms at lattice points, or an edge of it. */
-static void values_equal_to_the_isovalue_are_inside(void **state) {
+static void values_equal_to_the_isovalue_are_outside(void **state) {
     double xyzr[4 * 8];
     const size_t atoms = test_size(8, 2);
     for (size_t i = 0; i < atoms; ++i) {
@@ -857,7 +857,7 @@ static void refusals(void **state) {
                  OVOID_ERROR_ARGUMENT, "vertex rule");
     options = options_of(50.0, 0.5, OVOID_VERTEX_EXACT);
     test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
-                 OVOID_ERROR_EMPTY, "below the isovalue 50 everywhere");
+                 OVOID_ERROR_EMPTY, "nowhere above the isovalue 50");
     options = options_of(3.0, 1000.0, OVOID_VERTEX_EXACT);
     test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                  OVOID_ERROR_EMPTY, "largest value of the field at a lattice point is 2.87");
@@ -889,7 +889,7 @@ int main(void) {
         cmocka_unit_test(a_vertex_without_gradient_has_a_normal),
         cmocka_unit_test(pieces_give_the_plain_mesh),
         cmocka_unit_test(exact_vertices_stay_on_their_edges),
-        cmocka_unit_test(values_equal_to_the_isovalue_are_inside),
+        cmocka_unit_test(values_equal_to_the_isovalue_are_outside),
         cmocka_unit_test(far_from_the_origin),
         cmocka_unit_test(memory_follows_the_surface),
         cmocka_unit_test(pieces_reach_as_far_as_the_surface),

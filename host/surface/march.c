@@ -542,7 +542,7 @@ static ovoid_status note_largest(ovoid_context *context, marcher *m) {
 static ovoid_status fail_empty(ovoid_context *context, const marcher *m) {
     if (m->pieces.pieces == 0)
         return ov_fail(context, OVOID_ERROR_EMPTY,
-                       "no surface: the field is below the isovalue %g everywhere",
+                       "no surface: the field is nowhere above the isovalue %g",
                        m->options->isovalue);
     return ov_fail(context, OVOID_ERROR_EMPTY,
                    "no surface: the largest value of the field at a lattice point is %g, and the "

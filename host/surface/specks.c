@@ -103,7 +103,7 @@ static void look_at(seeker *s, size_t point) {
     for (int axis = 0; axis < 3; ++axis)
         at[axis] = (double)index[axis] * s->box.spacing;
     s->log_ratio[point] = log_ratio_at(s, at, NULL);
-    s->state[point] = s->log_ratio[point] >= 0.0 ? INSIDE : OUTSIDE;
+    s->state[point] = s->log_ratio[point] > 0.0 ? INSIDE : OUTSIDE;
 }
 
 /* ---- the piece about a term --------------------------------------------------------------- */
@@ -278,7 +278,7 @@ static double find_crossing(const seeker *s, const double at[3], unsigned axis, 
         double y[3] = {at[0], at[1], at[2]}, gradient[3];
         y[axis] += t * h;
         const double value = log_ratio_at(s, y, gradient);
-        if ((value >= 0.0) == (log_low >= 0.0))
+        if ((value > 0.0) == (log_low > 0.0))
             from = t;
         else
             to = t;

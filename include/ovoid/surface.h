@@ -17,7 +17,7 @@ extern "C" {
 /* ---- meshes ------------------------------------------------------------------------------- */
 
 /* A closed triangle mesh of a surface phi = c: vertices shared, triangles counter-clockwise seen
- * from outside (where phi < c). */
+ * from outside (where phi <= c). No two vertices are equal, no triangle is without area. */
 typedef struct ovoid_mesh ovoid_mesh;
 
 /* Where the vertices lie on the edges of the lattice. */

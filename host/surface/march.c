@@ -790,15 +790,51 @@ static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh)
     return OVOID_OK;
 }
 
+/* Where there are so many more pieces than ones with a surface, smaller pieces are tried; and what
+ * a piece costs beside its points, in points. */
+#define EMPTY_SHARE 8.0
+#define OVERHEAD 5e4
+static const uint64_t sparse_limits[][3] = {{64, 64, 32}, {32, 32, 16}, {16, 16, 8}};
+
+static double cost_of(const ov_pieces *pieces) {
+    return (double)pieces->pieces *
+           (OVERHEAD + (double)pieces->size[0] * (double)pieces->size[1] * (double)pieces->size[2]);
+}
+
+/* Cuts the lattice into pieces: small ones where terms are few and far apart. */
+static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
+                         const uint64_t limit[3]) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_mesh_options *const o = m->options;
+    const double cutoff = OV_MARCH_CUTOFF * o->isovalue;
+    ov_pieces *const best = &m->pieces;
+    OV_TRY(
+        ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit, best));
+    if ((double)best->count[0] * (double)best->count[1] * (double)best->count[2] <=
+        EMPTY_SHARE * (double)best->pieces)
+        goto cleanup;
+    for (size_t k = 0; k < sizeof sparse_limits / sizeof *sparse_limits; ++k) {
+        ov_pieces other;
+        OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing,
+                                sparse_limits[k], &other));
+        if (cost_of(&other) < cost_of(best)) {
+            const ov_pieces swap = *best;
+            *best = other;
+            other = swap;
+        }
+        ov_pieces_destroy(&other);
+    }
+cleanup:
+    return status;
+}
+
 static ovoid_status march(ovoid_context *context, const ov_body *bodies, size_t count,
                           const ovoid_mesh_options *options, const uint64_t limit[3],
                           const double *origin, const ov_watch *watch, bool specks,
                           ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     marcher m = {.bodies = bodies, .options = options, .origin = origin, .watch = watch};
-    OV_TRY(ov_pieces_create(context, bodies, count, options->isovalue,
-                            OV_MARCH_CUTOFF * options->isovalue, options->spacing, limit,
-                            &m.pieces));
+    OV_TRY(plan(context, &m, count, limit));
     if (m.pieces.pieces > 0)
         OV_TRY(set_up(context, &m));
     OV_TRY(march_pieces(context, &m));

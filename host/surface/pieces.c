@@ -1,6 +1,7 @@
 #include "surface/pieces.h"
 
 #include "field/bricks.h"
+#include "field/work.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -36,7 +37,8 @@ double ov_body_reach(const ov_body *body, double value) {
 
 /* What a lattice index may be; differences and doubles stay exact far beyond. */
 #define INDEX_LIMIT 1e12
-#define POINTS_LIMIT 1e13 /* evaluated: days of work */
+/* By how much points are overestimated before pieces are told apart. */
+#define SLACK 8.0
 
 static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
@@ -131,11 +133,11 @@ static bool in_range(const uint64_t at[3], const uint64_t first[3], const uint64
     return true;
 }
 
-static double count_pairs(const planner *p) {
+static double count_pairs(const planner *p, double value) {
     double pairs = 0.0;
     uint64_t first[3], end[3];
     for (size_t i = 0; i < p->count; ++i) {
-        term_range(p, &p->bodies[i], p->cutoff, first, end);
+        term_range(p, &p->bodies[i], value, first, end);
         pairs +=
             (double)(end[0] - first[0]) * (double)(end[1] - first[1]) * (double)(end[2] - first[2]);
     }
@@ -175,9 +177,26 @@ static void keep_pieces(planner *p) {
     pieces->start[pieces->pieces] = kept;
 }
 
+static ovoid_status check_work(ovoid_context *context, const planner *p, double pieces,
+                               double slack) {
+    const uint64_t *const size = p->pieces->size;
+    return ov_work_check(context, pieces * (double)size[0] * (double)size[1] * (double)size[2],
+                         p->count, p->pieces->spacing, slack, "the surface");
+}
+
+/* Before pieces are told apart: all of the box, or all that terms reach, whichever is less. */
+static ovoid_status check_bound(ovoid_context *context, const planner *p) {
+    const uint64_t *const count = p->pieces->count;
+    const double box = (double)count[0] * (double)count[1] * (double)count[2];
+    return check_work(context, p, fmin(box, count_pairs(p, p->threshold)), SLACK);
+}
+
 static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
     ov_pieces *const pieces = p->pieces;
-    const double pairs = count_pairs(p);
+    const ovoid_status bound = check_bound(context, p);
+    if (bound != OVOID_OK)
+        return bound;
+    const double pairs = count_pairs(p, p->cutoff);
     if (!(pairs < (double)UINT32_MAX))
         return fail_large(context, pieces->spacing);
     const size_t room = (size_t)pairs;
@@ -201,9 +220,7 @@ static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
     if (!pieces->key || !pieces->start || !pieces->term)
         return OVOID_ERROR_MEMORY;
     keep_pieces(p);
-    const double points = (double)pieces->pieces * (double)pieces->size[0] *
-                          (double)pieces->size[1] * (double)pieces->size[2];
-    return points < POINTS_LIMIT ? OVOID_OK : fail_large(context, pieces->spacing);
+    return check_work(context, p, (double)pieces->pieces, 1.0);
 }
 
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,

@@ -121,7 +121,7 @@ static bool lay_box(const seeker *s, const ov_body *body, unsigned halvings, dou
     *b = (box){.halvings = halvings, .spacing = ldexp(s->options->spacing, -(int)halvings)};
     ov_speck_half(body, s->options->isovalue, s->options->spacing, share, half);
     for (int axis = 0; axis < 3; ++axis) {
-        const double centre = round(body->quadric.centre[axis] / b->spacing),
+        const double centre = floor(body->quadric.centre[axis] / b->spacing + 0.5),
                      steps = ceil(half[axis] / b->spacing) + 2.0;
         points *= 2.0 * steps + 1.0;
         if (!(fabs(centre) < INDEX_MOST && points <= (double)POINTS_MOST))

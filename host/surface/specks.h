@@ -10,8 +10,8 @@
 #include "ovoid/surface.h"
 #include "surface/pieces.h"
 
-/* A lattice is halved so often for a speck, at most: what is smaller than 1 / 256 of the spacing is
- * counted only. */
+/* A lattice is halved so often for a speck, at most: what is smaller than about a thousandth of the
+ * spacing is only counted. */
 #define OV_SPECK_HALVINGS 10
 
 /* Closed meshes, appended one after another. */

@@ -8,7 +8,7 @@
 #include <math.h>
 
 /* Steps of a float within one of the lattice, at least, for a mesh to look as it should. */
-#define STEPS_FINE 64.0
+#define STEPS_FINE 512.0
 /* And for its vertices to stay apart: each keeps one from the ends of its edge. */
 #define STEPS_LEAST 8.0
 

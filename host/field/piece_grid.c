@@ -17,8 +17,6 @@ enum { LIMITS = sizeof limits / sizeof *limits };
 #define OVERHEAD 2e4
 /* Pieces of one axis, and of all, at most. */
 #define COUNT_MOST 4e18
-/* By how much the points are overestimated before pieces are told apart. */
-#define SLACK 8.0
 
 static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
@@ -52,6 +50,12 @@ static double points_of(const ov_piece_grid *grid) {
     return (double)grid->size[0] * (double)grid->size[1] * (double)grid->size[2];
 }
 
+/* How far (angstrom) an atom's Gaussian reaches the cut-off. */
+static double reach_of(const planner *p, size_t atom) {
+    const double radius = p->xyzr[4 * atom + 3];
+    return sqrt(radius * radius - log(OV_TARGET_CUTOFF) / p->decay);
+}
+
 /* Range of pieces along one axis that an atom of this reach touches; empty if first > last. */
 static void piece_range(const planner *p, size_t axis, double centre, double reach, int64_t *first,
                         int64_t *last) {
@@ -64,14 +68,15 @@ static void piece_range(const planner *p, size_t axis, double centre, double rea
 }
 
 static void atom_range(const planner *p, size_t atom, int64_t first[3], int64_t last[3]) {
-    const double *const a = p->xyzr + 4 * atom;
-    const double reach = sqrt(a[3] * a[3] - log(OV_TARGET_CUTOFF) / p->decay);
+    const double reach = reach_of(p, atom);
     for (size_t axis = 0; axis < 3; ++axis)
-        piece_range(p, axis, a[axis], reach, &first[axis], &last[axis]);
+        piece_range(p, axis, p->xyzr[4 * atom + axis], reach, &first[axis], &last[axis]);
 }
 
-static double count_pairs(const planner *p) {
+/* Pairs of a piece and an atom that reaches it; *most: of one atom. */
+static double count_pairs(const planner *p, double *most) {
     double pairs = 0.0;
+    *most = 0.0;
     for (size_t i = 0; i < p->atoms; ++i) {
         int64_t first[3], last[3];
         double own = 1.0;
@@ -79,6 +84,7 @@ static double count_pairs(const planner *p) {
         for (int axis = 0; axis < 3; ++axis)
             own *= fmax(0.0, (double)(last[axis] - first[axis]) + 1.0);
         pairs += own;
+        *most = fmax(*most, own);
     }
     return pairs;
 }
@@ -109,7 +115,8 @@ static void drop_pairs(planner *p) {
 
 /* Lists and sorts the pairs, and counts the pieces that atoms reach. */
 static ovoid_status sort_pairs(ovoid_context *context, planner *p, double spacing) {
-    const double pairs = count_pairs(p);
+    double most;
+    const double pairs = count_pairs(p, &most);
     drop_pairs(p);
     if (!(pairs < (double)UINT32_MAX))
         return ov_fail(
@@ -132,12 +139,38 @@ static ovoid_status sort_pairs(ovoid_context *context, planner *p, double spacin
     return OVOID_OK;
 }
 
-/* Refuses what is too much; before pieces are told apart, by a bound. */
-static ovoid_status check_work(ovoid_context *context, const planner *p, double total,
-                               double pieces, double slack) {
-    return ov_work_check(context, fmin(total, pieces) * points_of(p->grid), p->atoms,
-                         fmax(fmax(p->lattice->step[0], p->lattice->step[1]), p->lattice->step[2]),
-                         slack, "constrained points");
+/* Values of Gaussians at lattice points, about. */
+static double count_values(const planner *p) {
+    const double *const step = p->lattice->step;
+    const double cell = step[0] * step[1] * step[2];
+    double points = 1.0, values = 0.0;
+    for (int axis = 0; axis < 3; ++axis)
+        points *= (double)p->lattice->size[axis];
+    for (size_t i = 0; i < p->atoms; ++i)
+        values += fmin(points, 4.19 * pow(reach_of(p, i), 3) / cell);
+    return values;
+}
+
+/* Refuses what is too much: so many pieces at least and at most. */
+static ovoid_status check_work(ovoid_context *context, const planner *p, double least,
+                               double most) {
+    const double *const step = p->lattice->step;
+    const ov_work work = {.points_least = least * points_of(p->grid),
+                          .points_most = most * points_of(p->grid),
+                          .values = count_values(p),
+                          .terms = p->atoms,
+                          .spacing = fmax(fmax(step[0], step[1]), step[2]),
+                          .what = "constrained points"};
+    return ov_work_check(context, &work);
+}
+
+/* Before pieces are told apart: at least those of one atom, and at most all, or all that atoms
+ * reach.
+ */
+static ovoid_status check_bounds(ovoid_context *context, const planner *p, double total) {
+    double most;
+    const double pairs = count_pairs(p, &most);
+    return check_work(context, p, most, fmin(total, pairs));
 }
 
 /* The largest pieces; or where these are few of many, those that cost least. */
@@ -149,7 +182,8 @@ static ovoid_status choose_pieces(ovoid_context *context, planner *p, double *to
         *total = cut(p->lattice, limits[n], p->grid);
         if (!(*total < COUNT_MOST))
             break;
-        OV_TRY(check_work(context, p, *total, count_pairs(p), n == 0 ? SLACK : INFINITY));
+        if (n == 0)
+            OV_TRY(check_bounds(context, p, *total));
         OV_TRY(sort_pairs(context, p, p->lattice->step[0]));
         const double cost = (double)p->reached * (points_of(p->grid) + OVERHEAD);
         if (n == 0 && *total <= EMPTY_SHARE * (double)p->reached)
@@ -195,7 +229,8 @@ ovoid_status ov_piece_grid_create(ovoid_context *context, const ov_lattice *latt
     *grid = (ov_piece_grid){0};
     OV_TRY(choose_pieces(context, &p, &total));
     const bool all = with_empty && total <= EMPTY_SHARE * (double)p.reached;
-    OV_TRY(check_work(context, &p, total, all ? total : (double)p.reached, 1.0));
+    const double pieces = all ? total : (double)p.reached;
+    OV_TRY(check_work(context, &p, pieces, pieces));
     OV_TRY(fill_grid(context, &p, all, (size_t)total));
 cleanup:
     drop_pairs(&p);

@@ -2,14 +2,25 @@
 
 #include <math.h>
 
-ovoid_status ov_work_check(ovoid_context *context, double points, size_t terms, double spacing,
-                           double slack, const char *what) {
-    const double most = fmax(OV_WORK_POINTS, OV_WORK_POINTS_PER_TERM * (double)terms);
-    if (points <= slack * most)
-        return OVOID_OK;
-    return ov_fail(
-        context, OVOID_ERROR_LIMIT,
-        "the lattice for %s would have about %.1e points at a spacing of %g angstrom, more "
-        "than %.0e; use a spacing of about %.2g angstrom or more",
-        what, points, spacing, most, spacing * cbrt(points / most));
+/* By how much a bound of the points may be above what is allowed before it tells. */
+#define SLACK 8.0
+
+static ovoid_status refuse(ovoid_context *context, const ov_work *work, const char *of,
+                           double number, double most) {
+    return ov_fail(context, OVOID_ERROR_LIMIT,
+                   "the lattice for %s would have about %.1e %s at a spacing of %g angstrom, more "
+                   "than %.0e; use a spacing of about %.2g angstrom or more",
+                   work->what, number, of, work->spacing, most,
+                   work->spacing * cbrt(number / most));
+}
+
+ovoid_status ov_work_check(ovoid_context *context, const ov_work *work) {
+    const double terms = (double)work->terms,
+                 points = fmax(OV_WORK_POINTS, OV_WORK_POINTS_PER_TERM * terms),
+                 values = fmax(OV_WORK_VALUES, OV_WORK_VALUES_PER_TERM * terms);
+    if (!(work->points_least <= points && work->points_most <= SLACK * points))
+        return refuse(context, work, "points", work->points_most, points);
+    if (!(work->values <= values))
+        return refuse(context, work, "values of Gaussians at its points", work->values, values);
+    return OVOID_OK;
 }

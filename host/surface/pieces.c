@@ -37,8 +37,6 @@ double ov_body_reach(const ov_body *body, double value) {
 
 /* What a lattice index may be; differences and doubles stay exact far beyond. */
 #define INDEX_LIMIT 1e12
-/* By how much points are overestimated before pieces are told apart. */
-#define SLACK 8.0
 
 static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
@@ -133,13 +131,17 @@ static bool in_range(const uint64_t at[3], const uint64_t first[3], const uint64
     return true;
 }
 
-static double count_pairs(const planner *p, double value) {
+/* Pairs of a piece and a term that reaches the value in it; *most: of one term. */
+static double count_pairs(const planner *p, double value, double *most) {
     double pairs = 0.0;
     uint64_t first[3], end[3];
+    *most = 0.0;
     for (size_t i = 0; i < p->count; ++i) {
         term_range(p, &p->bodies[i], value, first, end);
-        pairs +=
+        const double own =
             (double)(end[0] - first[0]) * (double)(end[1] - first[1]) * (double)(end[2] - first[2]);
+        pairs += own;
+        *most = fmax(*most, own);
     }
     return pairs;
 }
@@ -177,26 +179,53 @@ static void keep_pieces(planner *p) {
     pieces->start[pieces->pieces] = kept;
 }
 
-static ovoid_status check_work(ovoid_context *context, const planner *p, double pieces,
-                               double slack) {
-    const uint64_t *const size = p->pieces->size;
-    return ov_work_check(context, pieces * (double)size[0] * (double)size[1] * (double)size[2],
-                         p->count, p->pieces->spacing, slack, "the surface");
+/* Values of terms at lattice points, about: in its ellipsoid {q <= s^2} a term counts. */
+static double count_values(const planner *p) {
+    const double cell = pow(p->pieces->spacing, 3);
+    double values = 0.0;
+    for (size_t i = 0; i < p->count; ++i) {
+        const double *const a = p->bodies[i].quadric.a;
+        const double reach = fmax(0.0, ov_body_reach(&p->bodies[i], p->cutoff));
+        const double determinant = a[0] * (a[3] * a[5] - a[4] * a[4]) -
+                                   a[1] * (a[1] * a[5] - a[4] * a[2]) +
+                                   a[2] * (a[1] * a[4] - a[3] * a[2]);
+        if (determinant > 0.0)
+            values += 4.19 * pow(reach, 3) / (sqrt(determinant) * cell);
+    }
+    return values;
 }
 
-/* Before pieces are told apart: all of the box, or all that terms reach, whichever is less. */
-static ovoid_status check_bound(ovoid_context *context, const planner *p) {
+/* Refuses what is too much: so many pieces at least and at most. */
+static ovoid_status check_work(ovoid_context *context, const planner *p, double least,
+                               double most) {
+    const uint64_t *const size = p->pieces->size;
+    const double points = (double)size[0] * (double)size[1] * (double)size[2];
+    const ov_work work = {.points_least = least * points,
+                          .points_most = most * points,
+                          .values = count_values(p),
+                          .terms = p->count,
+                          .spacing = p->pieces->spacing,
+                          .what = "the surface"};
+    return ov_work_check(context, &work);
+}
+
+/* Before pieces are told apart: at least those of one term, and at most all of the box or all that
+ * terms reach. */
+static ovoid_status check_bounds(ovoid_context *context, const planner *p) {
     const uint64_t *const count = p->pieces->count;
-    const double box = (double)count[0] * (double)count[1] * (double)count[2];
-    return check_work(context, p, fmin(box, count_pairs(p, p->threshold)), SLACK);
+    double most;
+    const double box = (double)count[0] * (double)count[1] * (double)count[2],
+                 pairs = count_pairs(p, p->threshold, &most);
+    return check_work(context, p, most, fmin(box, pairs));
 }
 
 static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
     ov_pieces *const pieces = p->pieces;
-    const ovoid_status bound = check_bound(context, p);
+    double most;
+    const ovoid_status bound = check_bounds(context, p);
     if (bound != OVOID_OK)
         return bound;
-    const double pairs = count_pairs(p, p->cutoff);
+    const double pairs = count_pairs(p, p->cutoff, &most);
     if (!(pairs < (double)UINT32_MAX))
         return fail_large(context, pieces->spacing);
     const size_t room = (size_t)pairs;
@@ -220,7 +249,7 @@ static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
     if (!pieces->key || !pieces->start || !pieces->term)
         return OVOID_ERROR_MEMORY;
     keep_pieces(p);
-    return check_work(context, p, (double)pieces->pieces, 1.0);
+    return check_work(context, p, (double)pieces->pieces, (double)pieces->pieces);
 }
 
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,

@@ -41,8 +41,8 @@ OVOID_API void ovoid_mesh_options_init(ovoid_mesh_options *options);
  * the lattice, of single atoms and ellipsoids above all, are meshed on finer lattices, each the
  * last one halved; a warning counts what is smaller than a thousandth of the spacing. Time and
  * memory follow the surface, not the box. OVOID_ERROR_EMPTY when the field is nowhere above the
- * isovalue on the lattice, OVOID_ERROR_LIMIT when that would have more than 2e10 points, and 1e5
- * for each atom or ellipsoid. */
+ * isovalue on the lattice, OVOID_ERROR_LIMIT when that would have more than 2e10 points and 1e5
+ * for each atom or ellipsoid, or more than 1e12 values of Gaussians at them and 1e6 for each. */
 OVOID_API ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *molecule,
                                            double decay, const ovoid_mesh_options *options,
                                            ovoid_mesh **mesh);

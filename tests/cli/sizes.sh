@@ -81,3 +81,8 @@ refused fit a.xyzr -o b.ovoid --spacing 0.001
 refused fit a.xyzr -o b.ovoid --mesh-spacing 0.001
 refused fit a.xyzr -o b.ovoid --decay 1e-6
 refused fit a.xyzr -o b.ovoid --method l1 --spacing 0.001
+make_helix 4000 ../big.xyzr
+run "$OVOID" mesh ../big.xyzr -o a.ply --decay 1e-4
+expect_code 6
+expect_err " values of Gaussians at its points at a spacing of 0.5 angstrom, more than 1e+12; use a spacing of about "
+expect_files a.xyzr a.ovoid far.xyzr many.xyzr small.xyzr stray.xyzr tiny.xyzr

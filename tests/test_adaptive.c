@@ -578,13 +578,30 @@ static void bad_options_are_named(void **state) {
 
 static void impossible_molecules(void **state) {
     const double bead[4] = {0.0, 0.0, 0.0, 20.0};
-    const double apart[8] = {-1e5, -1e5, -1e5, 1.7, 1e5, 1e5, 1e5, 1.7};
-    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+    ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
     ovoid_molecule *molecule = molecule_of(*state, bead, 1);
     expect_refusal(*state, molecule, &options, OVOID_ERROR_LIMIT, "radius");
     ovoid_molecule_destroy(&molecule);
-    molecule = molecule_of(*state, apart, 2);
-    expect_refusal(*state, molecule, &options, OVOID_ERROR_LIMIT, "spacing");
+    molecule = molecule_of(*state, (double[]){0.0, 0.0, 0.0, 1.7}, 1);
+    options.spacing = 1e-4;
+    expect_refusal(
+        *state, molecule, &options, OVOID_ERROR_LIMIT,
+        "points at a spacing of 0.0001 angstrom, more than 2e+10; use a spacing of about");
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* What atoms cost goes with them, not with the box about them; and one that is by itself has an
+ * ellipsoid of its own. */
+static void atoms_far_apart(void **state) {
+    test_skip_simulated(*state);
+    const double apart[16] = {-1e4, -1e4, -1e4,      1.7, 1e4,       1e4, 1e4, 1.7,
+                              1e4,  1e4,  1e4 - 1.4, 1.7, 1e4 - 1.4, 1e4, 1e4, 1.7};
+    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+    ovoid_molecule *molecule = molecule_of(*state, apart, 4);
+    outcome o = fit(*state, molecule, &options);
+    assert_true(o.result.reached && o.result.distance <= 0.5);
+    assert_true(o.result.points < 100000 && o.result.ellipsoids >= 2);
+    ovoid_model_destroy(&o.model);
     ovoid_molecule_destroy(&molecule);
 }
 
@@ -608,6 +625,7 @@ int main(void) {
         cmocka_unit_test(a_stopped_fit_hands_over_nothing),
         cmocka_unit_test(bad_options_are_named),
         cmocka_unit_test(impossible_molecules),
+        cmocka_unit_test(atoms_far_apart),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

@@ -602,8 +602,9 @@ typedef struct ovoid_fit_result {
     bool reached; /* the goal, as measured: verdict is OVOID_VERDICT_REACHED. Always true of l1,
                      which has no goal */
     ovoid_verdict verdict;
-    double distance; /* largest between the outer surfaces, measured, angstrom; NAN where it was
-                        not measured (l1, no surface, or too coarse a mesh) */
+    double distance; /* largest between the outer surfaces, measured, angstrom: right to 1e-7 of the
+                        molecule's half extent; NAN where it was not measured (l1, no surface, or
+                        too coarse a mesh) */
     uint64_t solver_iterations; /* of conjugate gradients (adaptive) */
     double sample_seconds;
     double fit_seconds;

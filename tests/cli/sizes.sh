@@ -86,3 +86,11 @@ run "$OVOID" mesh ../big.xyzr -o a.ply --decay 1e-4
 expect_code 6
 expect_err " values of Gaussians at its points at a spacing of 0.5 angstrom, more than 1e+12; use a spacing of about "
 expect_files a.xyzr a.ovoid far.xyzr many.xyzr small.xyzr stray.xyzr tiny.xyzr
+
+# A picture as deep as that of atoms all over space.
+run "$OVOID" render many.xyzr -o a.png
+expect_code 6
+expect_err " angstrom along the line of sight are too deep for a picture of so many pixels; take a smaller one"
+expect_files a.xyzr a.ovoid far.xyzr many.xyzr small.xyzr stray.xyzr tiny.xyzr
+run "$OVOID" render many.xyzr -o a.png --size 40x30
+expect_code 0

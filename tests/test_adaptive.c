@@ -594,8 +594,8 @@ static void impossible_molecules(void **state) {
  * ellipsoid of its own. */
 static void atoms_far_apart(void **state) {
     test_skip_simulated(*state);
-    const double apart[16] = {-1e4, -1e4, -1e4,      1.7, 1e4,       1e4, 1e4, 1.7,
-                              1e4,  1e4,  1e4 - 1.4, 1.7, 1e4 - 1.4, 1e4, 1e4, 1.7};
+    const double apart[16] = {-1e3, -1e3, -1e3,      1.7, 1e3,       1e3, 1e3, 1.7,
+                              1e3,  1e3,  1e3 - 1.4, 1.7, 1e3 - 1.4, 1e3, 1e3, 1.7};
     const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
     ovoid_molecule *molecule = molecule_of(*state, apart, 4);
     outcome o = fit(*state, molecule, &options);

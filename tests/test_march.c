@@ -787,6 +787,7 @@ static void light_meshes_are_the_same(void **state) {
 
 /* A small sphere, wherever it lies between the lattice's points: one piece, with its area. */
 static void small_spheres_have_their_area(void **state) {
+    test_skip_simulated(*state);
     static const double radii[] = {0.01, 0.05, 0.2, 0.4, 0.45, 0.6, 0.9, 1.1};
     test_random random = {21};
     for (size_t k = 0; k < test_size(sizeof radii / sizeof *radii, 3); ++k)
@@ -809,6 +810,7 @@ static void small_spheres_have_their_area(void **state) {
 /* Far apart, one of them at a lattice point and others between: each is one piece, and none twice.
  */
 static void specks_are_found_once(void **state) {
+    test_skip_simulated(*state);
     enum { SIDE = 6, ATOMS = SIDE * SIDE * SIDE };
     static double xyzr[4 * ATOMS];
     const size_t atoms = test_size(ATOMS, 4);
@@ -856,6 +858,7 @@ static void specks_beside_others(void **state) {
 }
 
 static void small_ellipsoids_have_their_volume(void **state) {
+    test_skip_simulated(*state);
     const ovoid_ellipsoid two[] = {{.amplitude = 2.0,
                                     .decay = {60.0, 25.0, 9.0},
                                     .centre = {3.3, 0.2, 0.1},
@@ -886,6 +889,7 @@ static void keep_text(const char *text, void *user) {
 
 /* What is too small for any lattice is counted, and there is no other warning. */
 static void what_is_missed_is_counted(void **state) {
+    test_skip_simulated(*state);
     const double xyzr[] = {0.1, 0.2, 0.3, 1.5, 9.013, 0.021, 0.037, 1e-5, 0.1, 9.2, 0.3, 0.3};
     const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
     char text[256] = "";
@@ -933,6 +937,7 @@ static void large_pieces_are_left_alone(void **state) {
 /* Atoms without neighbours, as far apart as coordinates allow: work for each, none for the
  * space between. */
 static void atoms_far_apart(void **state) {
+    test_skip_simulated(*state);
     enum { ATOMS = 60 };
     double xyzr[4 * ATOMS];
     test_random random = {31};

@@ -87,7 +87,9 @@ static inline uint lowest_bit(uint mask) {
     return 31 - clz(mask & -mask);
 }
 
-/* sign: bit j set where point j of a brick is inside, phi >= c. All bricks of the padded grid. */
+/* sign: bit j set where point j of a brick is inside, phi > c: a point where phi only touches c,
+ * such as the centre of an atom of radius 0, has no surface about it. All bricks of the padded
+ * grid. */
 __kernel void march_signs(const uint bricks, const uint run, const float isovalue,
                           __global const uint *restrict place, __global const float *restrict value,
                           __global uint *restrict sign) {
@@ -96,7 +98,7 @@ __kernel void march_signs(const uint bricks, const uint run, const float isovalu
         __global const float *const v = value + (size_t)place[brick] * OV_PACK;
         uint mask = 0;
         for (uint j = 0; j < OV_PACK; ++j)
-            mask |= (v[j] >= isovalue ? 1u : 0u) << j;
+            mask |= (v[j] > isovalue ? 1u : 0u) << j;
         sign[brick] = mask;
     }
 }
@@ -160,6 +162,16 @@ static inline spot move_to_corner(uint brick, uint point, uint corner, uint nx, 
     return p;
 }
 
+/* A vertex keeps this far from the ends of its edge, in lattice steps: where the surface passes
+ * through a lattice point, all its edges have their vertex there, and programs that merge equal
+ * vertices would be left with triangles without area and holes. Three points within three edges of
+ * a box are never on one line, so that apart from these ends no triangle can lose its area. */
+#define EDGE_MARGIN 7.62939453125e-6f /* 2^-17, as in host/surface/march.h */
+
+static inline float keep_within(float t) {
+    return clamp(t, EDGE_MARGIN, 1.0f - EDGE_MARGIN);
+}
+
 /* Where phi is c between a at 0 and b at 1. Interpolates ln phi if `logarithmic`: the start of a
  * search, as ln phi is quadratic about a single atom. */
 static inline float crossing_at(float a, float b, float isovalue, int logarithmic) {
@@ -198,8 +210,8 @@ __kernel void march_vertices(const uint count, __global const uint4 *restrict li
             const float b = value[(size_t)place[end.brick] * OV_PACK + end.point];
             const uint x = bx * OV_BRICK_X + (point & 3u), y = by * OV_BRICK_Y + (point >> 2 & 1u),
                        z = bz * OV_BRICK_Z + (point >> 3);
-            edge[at] = x | y << 7 | z << 14 | axis << 20 | (a >= isovalue ? 1u : 0u) << 22;
-            t[at] = crossing_at(a, b, isovalue, logarithmic);
+            edge[at] = x | y << 7 | z << 14 | axis << 20 | (a > isovalue ? 1u : 0u) << 22;
+            t[at] = keep_within(crossing_at(a, b, isovalue, logarithmic));
         }
 }
 
@@ -299,7 +311,7 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
             }
             if (step >= steps)
                 break;
-            const ov_ivec beyond = (sum >= isovalue) == low_inside;
+            const ov_ivec beyond = (sum > isovalue) == low_inside;
             from = moving && beyond ? s : from;
             to = moving && !beyond ? s : to;
             const ov_vec slope = fma(gx, ux, fma(gy, uy, gz * uz)) * (M_LN2_F * h);
@@ -320,7 +332,7 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
         gy *= scale;
         gz *= scale;
         const ov_vec length = usable ? one / sqrt(fma(gx, gx, fma(gy, gy, gz * gz))) : zero;
-        OV_STORE(s, place, ts);
+        OV_STORE(clamp(s, (ov_vec)EDGE_MARGIN, (ov_vec)(1.0f - EDGE_MARGIN)), place, ts);
         OV_STORE(usable ? gx * length : zero, place, out);
         OV_STORE(usable ? gy * length : zero, place, out + OV_PACK);
         OV_STORE(usable ? gz * length : zero, place, out + 2 * OV_PACK);

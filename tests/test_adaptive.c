@@ -334,8 +334,8 @@ static void coincident_atoms(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
-/* Where the field nowhere reaches the isovalue, the model follows the field, and there is no
- * distance; a goal that is about surfaces holds. */
+/* Where the field is nowhere above the isovalue, the model follows the field, and there is no
+ * distance: a goal that is about surfaces is not reached, since nothing was measured. */
 static void no_surface(void **state) {
     test_skip_simulated(*state);
     const double bare[12] = {0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 9.0, 0.0, 0.0};
@@ -346,7 +346,10 @@ static void no_surface(void **state) {
         ovoid_fit_options options = all[n];
         options.isovalue = 1.5;
         outcome o = fit(*state, molecule, &options);
-        assert_true(isnan(o.result.distance) && o.result.reached);
+        assert_true(isnan(o.result.distance));
+        assert_true(o.result.reached == (options.adaptive.goal == OVOID_GOAL_ELLIPSOIDS));
+        assert_int_equal(o.result.verdict,
+                         o.result.reached ? OVOID_VERDICT_REACHED : OVOID_VERDICT_NO_SURFACE);
         ovoid_model_destroy(&o.model);
     }
     ovoid_molecule_destroy(&molecule);
@@ -630,13 +633,30 @@ static void bad_options_are_named(void **state) {
 
 static void impossible_molecules(void **state) {
     const double bead[4] = {0.0, 0.0, 0.0, 20.0};
-    const double apart[8] = {-1e5, -1e5, -1e5, 1.7, 1e5, 1e5, 1e5, 1.7};
-    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+    ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
     ovoid_molecule *molecule = molecule_of(*state, bead, 1);
     expect_refusal(*state, molecule, &options, OVOID_ERROR_LIMIT, "radius");
     ovoid_molecule_destroy(&molecule);
-    molecule = molecule_of(*state, apart, 2);
-    expect_refusal(*state, molecule, &options, OVOID_ERROR_LIMIT, "spacing");
+    molecule = molecule_of(*state, (double[]){0.0, 0.0, 0.0, 1.7}, 1);
+    options.spacing = 1e-4;
+    expect_refusal(
+        *state, molecule, &options, OVOID_ERROR_LIMIT,
+        "points at a spacing of 0.0001 angstrom, more than 2e+10; use a spacing of about");
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* What atoms cost goes with them, not with the box about them; and one that is by itself has an
+ * ellipsoid of its own. */
+static void atoms_far_apart(void **state) {
+    test_skip_simulated(*state);
+    const double apart[16] = {-1e3, -1e3, -1e3,      1.7, 1e3,       1e3, 1e3, 1.7,
+                              1e3,  1e3,  1e3 - 1.4, 1.7, 1e3 - 1.4, 1e3, 1e3, 1.7};
+    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+    ovoid_molecule *molecule = molecule_of(*state, apart, 4);
+    outcome o = fit(*state, molecule, &options);
+    assert_true(o.result.reached && o.result.distance <= 0.5);
+    assert_true(o.result.points < 100000 && o.result.ellipsoids >= 2);
+    ovoid_model_destroy(&o.model);
     ovoid_molecule_destroy(&molecule);
 }
 
@@ -662,6 +682,7 @@ int main(void) {
         cmocka_unit_test(a_stopped_fit_hands_over_nothing),
         cmocka_unit_test(bad_options_are_named),
         cmocka_unit_test(impossible_molecules),
+        cmocka_unit_test(atoms_far_apart),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

@@ -326,23 +326,44 @@ static void missing_arguments(void **state) {
 
 static void impossible_molecules(void **state) {
     const double bead[4] = {0.0, 0.0, 0.0, 20.0}, atom[4] = {0.0, 0.0, 0.0, 2.0};
-    const double apart[8] = {-1e5, -1e5, -1e5, 1.7, 1e5, 1e5, 1e5, 1.7};
     ovoid_model *model = NULL;
     ovoid_fit_options options = short_options();
     ovoid_molecule *molecule = molecule_of(*state, bead, 1);
     test_refused(*state, ovoid_fit(*state, molecule, &options, &model, NULL), OVOID_ERROR_LIMIT,
                  "radius");
     ovoid_molecule_destroy(&molecule);
-    molecule = molecule_of(*state, apart, 2);
+    molecule = molecule_of(*state, atom, 1);
+    options.spacing = 1e-4;
     test_refused(*state, ovoid_fit(*state, molecule, &options, &model, NULL), OVOID_ERROR_LIMIT,
-                 "spacing");
+                 "points at a spacing of 0.0001 angstrom, more than 2e+10; use a spacing of about");
     ovoid_molecule_destroy(&molecule);
+    options.spacing = short_options().spacing;
     options.padding = 0.0; /* one lattice point, at the centre, where phi = e^2 */
     molecule = molecule_of(*state, atom, 1);
     test_refused(*state, ovoid_fit(*state, molecule, &options, &model, NULL), OVOID_ERROR_EMPTY,
                  "no lattice point");
     ovoid_molecule_destroy(&molecule);
     assert_null(model);
+}
+
+/* Atoms as far apart as can be: each has the points, and the model, that it would have by itself.
+ */
+static void atoms_far_apart(void **state) {
+    test_skip_simulated(*state);
+    const double apart[8] = {-1e6, -1e6, -1e6, 1.7, 1e6, 1e6, 1e6, 1.7};
+    const ovoid_fit_options options = short_options();
+    ovoid_fit_result result;
+    ovoid_model *model = NULL;
+    ovoid_molecule *molecule = molecule_of(*state, apart, 2);
+    test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    assert_int_equal(result.ellipsoids, 2);
+    assert_true(result.points < 100000);
+    for (size_t i = 0; i < 2; ++i)
+        for (size_t k = 0; k < 3; ++k)
+            expect_near(ovoid_model_ellipsoids(model)[i].centre[k], apart[4 * i + k], 0.3,
+                        "a centre");
+    ovoid_molecule_destroy(&molecule);
+    ovoid_model_destroy(&model);
 }
 
 /* ---- real molecules ----------------------------------------------------------------------- */
@@ -414,6 +435,7 @@ int main(void) {
         cmocka_unit_test(defaults_are_accepted),
         cmocka_unit_test(missing_arguments),
         cmocka_unit_test(impossible_molecules),
+        cmocka_unit_test(atoms_far_apart),
         cmocka_unit_test(small_molecule),
         cmocka_unit_test(protein),
         cmocka_unit_test(fasciculin),

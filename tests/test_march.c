@@ -4,6 +4,8 @@
  */
 #include "support.h"
 
+#include <unistd.h>
+
 #include "fit/model.h"
 #include "reference/march.h"
 #include "surface/case_table.h"
@@ -201,12 +203,14 @@ static int64_t expect_closed(const ovoid_mesh *mesh) {
     return (int64_t)vertices - (int64_t)sides / 2 + (int64_t)sides / 3;
 }
 
-/* Vertices lie on edges of the lattice of multiples of the spacing. Returns the axis of vertex v's
- * edge and its low end; a vertex at a lattice point is taken for one on an edge along x. */
+/* Vertices lie on edges of the lattice of multiples of the spacing, halved for specks. Returns the
+ * axis of vertex v's edge and its low end; a vertex at a lattice point is taken for one on an edge
+ * along x. */
 static unsigned edge_of(const ovoid_mesh *mesh, size_t v, double spacing, int64_t low[3]) {
     const double *const at = ovoid_mesh_xyz(mesh) + 3 * v;
     unsigned axis = 0;
     double furthest = -1.0;
+    spacing = mesh->edge ? ldexp(spacing, -(int)(mesh->edge[v] >> OV_EDGE_AXIS_BITS)) : spacing;
     for (unsigned k = 0; k < 3; ++k) {
         const double u = at[k] / spacing, off = fabs(u - round(u));
         low[k] = (int64_t)round(u);
@@ -459,7 +463,7 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
     test_check(*state, ovoid_molecule_create(*state, xyzr, 2, &molecule));
     test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, origin, 1, &c, NULL));
     for (int rule = 0; rule < 2; ++rule) {
-        const ovoid_mesh_options options = options_of(c, coarse(0.5), (ovoid_vertex_rule)rule);
+        const ovoid_mesh_options options = options_of(c, 0.5, (ovoid_vertex_rule)rule);
         size_t at_origin = 0;
         double sum[3] = {0};
         test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
@@ -467,7 +471,7 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
         for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
             const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
             const float *const n = ovoid_mesh_normals(mesh) + 3 * v;
-            if (y[0] == 0.0 && y[1] == 0.0 && y[2] == 0.0) {
+            if (fabs(y[0]) + fabs(y[1]) + fabs(y[2]) < 1e-5) { /* all but there: see march.cl */
                 ++at_origin;
                 for (int k = 0; k < 3; ++k)
                     sum[k] += n[k];
@@ -475,9 +479,9 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
             expect_near((double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2], 1.0, 1e-5,
                         "a normal's square");
         }
-        assert_int_equal(at_origin, 4); /* the origin is inside: on the edges up and down from it */
+        assert_int_equal(at_origin, 2); /* the origin is outside: on the edges to the atoms */
         for (int k = 0; k < 3; ++k)
-            expect_near(sum[k], 0.0, 2.0, "the sum of four normals that face all ways");
+            expect_near(sum[k], 0.0, 2.0, "the sum of two normals that face each other");
         ovoid_mesh_destroy(&mesh);
     }
     ovoid_molecule_destroy(&molecule);
@@ -605,7 +609,7 @@ static void exact_vertices_stay_on_their_edges(void **state) {
 /* ---- lattices ----------------------------------------------------------------------------- */
 
 /* phi is c at many lattice points: a cube of atoms at lattice points, or an edge of it. */
-static void values_equal_to_the_isovalue_are_inside(void **state) {
+static void values_equal_to_the_isovalue_are_outside(void **state) {
     double xyzr[4 * 8];
     const size_t atoms = test_size(8, 2);
     for (size_t i = 0; i < atoms; ++i) {
@@ -779,6 +783,179 @@ static void light_meshes_are_the_same(void **state) {
     ovoid_mesh_destroy(&light);
 }
 
+/* ---- specks ------------------------------------------------------------------------------- */
+
+/* A small sphere, wherever it lies between the lattice's points: one piece, with its area. */
+static void small_spheres_have_their_area(void **state) {
+    test_skip_simulated(*state);
+    static const double radii[] = {0.01, 0.05, 0.2, 0.4, 0.45, 0.6, 0.9, 1.1};
+    test_random random = {21};
+    for (size_t k = 0; k < test_size(sizeof radii / sizeof *radii, 3); ++k)
+        for (int n = 0; n < (test_small() ? 1 : 6); ++n) {
+            const ovoid_mesh_options options =
+                options_of(1.0, 0.5, n % 2 ? OVOID_VERTEX_LINEAR : OVOID_VERTEX_EXACT);
+            const double atom[4] = {random_uniform(&random, -50.0, 50.0),
+                                    random_uniform(&random, -50.0, 50.0),
+                                    n == 0 ? 0.0 : random_uniform(&random, -50.0, 50.0), radii[k]};
+            ovoid_mesh *mesh = mesh_atoms(*state, atom, 1, 0.5, &options);
+            const double wanted = 4.0 * PI * radii[k] * radii[k];
+            assert_int_equal(expect_closed(mesh), 2);
+            if (options.vertices == OVOID_VERTEX_EXACT)
+                expect_near(ovoid_mesh_smooth_area(mesh) / wanted, 1.0, 1e-3, "an area");
+            expect_near(ovoid_mesh_area(mesh) / wanted, 1.0, 0.06, "a flat area");
+            ovoid_mesh_destroy(&mesh);
+        }
+}
+
+/* Far apart, one of them at a lattice point and others between: each is one piece, and none twice.
+ */
+static void specks_are_found_once(void **state) {
+    test_skip_simulated(*state);
+    enum { SIDE = 6, ATOMS = SIDE * SIDE * SIDE };
+    static double xyzr[4 * ATOMS];
+    const size_t atoms = test_size(ATOMS, 4);
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    const double area = 4.0 * PI * 0.04;
+    for (size_t i = 0; i < atoms; ++i) {
+        const double at[4] = {10.27 * (double)(i % SIDE), 10.41 * (double)(i / SIDE % SIDE),
+                              9.93 * (double)(i / (SIDE * SIDE)), 0.2};
+        memcpy(xyzr + 4 * i, at, sizeof at);
+    }
+    ovoid_mesh *mesh = mesh_atoms(*state, xyzr, atoms, 0.5, &options);
+    assert_int_equal(ovoid_mesh_components(mesh), atoms);
+    assert_int_equal(expect_closed(mesh), 2 * (int64_t)atoms);
+    expect_near(ovoid_mesh_smooth_area(mesh), (double)atoms * area, 1e-3 * (double)atoms * area,
+                "the area of all");
+    ovoid_mesh_destroy(&mesh);
+}
+
+/* Beside large atoms: a speck of its own, and one that has grown together with its neighbour; two
+ * that are one; as a fine lattice has them. */
+static void specks_beside_others(void **state) {
+    static const double apart[] = {0.0, 0.0, 0.0, 1.7, 3.41, 0.3, 0.2, 0.25},
+                        grown[] = {0.0, 0.0, 0.0, 1.7, 1.8, 0.3, 0.2, 0.25},
+                        twins[] = {0.2, 0.2, 0.2, 0.2, 0.5, 0.2, 0.3, 0.15},
+                        triple[] = {0.2, 0.2, 0.2, 0.3, 0.9, 0.2, 0.3, 0.15, 7.0, 7.0, 7.2, 0.3};
+    static const struct {
+        const double *xyzr;
+        size_t atoms, pieces;
+    } cases[] = {{apart, 2, 2}, {grown, 2, 1}, {twins, 2, 1}, {triple, 3, 2}};
+    if (test_small())
+        skip();
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+        const ovoid_mesh_options coarse_one = options_of(1.0, 0.5, OVOID_VERTEX_EXACT),
+                                 fine = options_of(1.0, 0.03, OVOID_VERTEX_EXACT);
+        ovoid_mesh *mesh = mesh_atoms(*state, cases[k].xyzr, cases[k].atoms, 0.5, &coarse_one),
+                   *other = mesh_atoms(*state, cases[k].xyzr, cases[k].atoms, 0.5, &fine);
+        assert_int_equal(ovoid_mesh_components(mesh), cases[k].pieces);
+        assert_int_equal(ovoid_mesh_components(other), cases[k].pieces);
+        assert_int_equal(expect_closed(mesh), 2 * (int64_t)cases[k].pieces);
+        expect_near(ovoid_mesh_smooth_area(mesh) / ovoid_mesh_smooth_area(other), 1.0, 2e-3,
+                    "the area on a fine lattice");
+        ovoid_mesh_destroy(&mesh);
+        ovoid_mesh_destroy(&other);
+    }
+}
+
+static void small_ellipsoids_have_their_volume(void **state) {
+    test_skip_simulated(*state);
+    const ovoid_ellipsoid two[] = {{.amplitude = 2.0,
+                                    .decay = {60.0, 25.0, 9.0},
+                                    .centre = {3.3, 0.2, 0.1},
+                                    .angle = {0.7, -1.1, 2.0}},
+                                   {.amplitude = 1.01,
+                                    .decay = {0.5, 0.3, 0.2},
+                                    .centre = {-30.0, 4.0, 0.0},
+                                    .angle = {0.1, 0.2, 0.3}}};
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    ovoid_model *model = NULL;
+    ovoid_mesh *mesh = NULL;
+    double volume = 0.0;
+    for (int i = 0; i < 2; ++i)
+        volume += 4.0 / 3.0 * PI * pow(log(two[i].amplitude), 1.5) /
+                  sqrt(two[i].decay[0] * two[i].decay[1] * two[i].decay[2]);
+    test_check(*state, ovoid_model_create(*state, two, 2, 0.5, 1.0, &model));
+    test_check(*state, ovoid_model_mesh(*state, model, &options, &mesh));
+    assert_int_equal(ovoid_mesh_components(mesh), 2);
+    assert_int_equal(expect_closed(mesh), 4);
+    expect_near(ovoid_mesh_smooth_volume(mesh) / volume, 1.0, 3e-3, "volume");
+    ovoid_mesh_destroy(&mesh);
+    ovoid_model_destroy(&model);
+}
+
+static void keep_text(const char *text, void *user) {
+    snprintf(user, 256, "%s", text);
+}
+
+/* What is too small for any lattice is counted, and there is no other warning. */
+static void what_is_missed_is_counted(void **state) {
+    test_skip_simulated(*state);
+    const double xyzr[] = {0.1, 0.2, 0.3, 1.5, 9.013, 0.021, 0.037, 1e-5, 0.1, 9.2, 0.3, 0.3};
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    char text[256] = "";
+    ovoid_context_on_warning(*state, keep_text, text);
+    ovoid_mesh *mesh = mesh_atoms(*state, xyzr, 1, 0.5, &options);
+    assert_string_equal(text, "");
+    ovoid_mesh_destroy(&mesh);
+    mesh = mesh_atoms(*state, xyzr, 3, 0.5, &options);
+    ovoid_context_on_warning(*state, NULL, NULL);
+    assert_non_null(strstr(text, "1 atom or ellipsoid makes a surface too small or too thin"));
+    assert_int_equal(ovoid_mesh_components(mesh), 2);
+    ovoid_mesh_destroy(&mesh);
+}
+
+/* What is not small is left as the lattice has it, at any isovalue: none of a protein's atoms, each
+ * of which is small where the isovalue is nearly its Gaussian's height. */
+static void large_pieces_are_left_alone(void **state) {
+    ovoid_molecule *molecule = NULL;
+    if (test_small() || access(APBS_FAS2, R_OK) != 0) {
+        print_message("no " APBS_FAS2 ", or small tests; install apbs-data\n");
+        skip();
+    }
+    test_check(*state, ovoid_molecule_read(*state, APBS_FAS2, OVOID_MOLECULE_AUTO, &molecule));
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    ov_body *const bodies = test_alloc(atoms, sizeof *bodies);
+    for (size_t i = 0; i < atoms; ++i)
+        ov_body_of_atom(ovoid_molecule_xyzr(molecule) + 4 * i, 0.5, &bodies[i]);
+    for (int k = 0; k < 3; ++k) {
+        const ovoid_mesh_options options =
+            options_of((double[]){1.0, 3.0, 4.0}[k], 0.5, OVOID_VERTEX_EXACT);
+        ovoid_mesh *plain = NULL, *mesh = NULL;
+        test_check(*state, ov_march(*state, bodies, atoms, &options, whole, &plain));
+        test_check(*state, ov_mesh_bodies(*state, bodies, atoms, &options, &mesh));
+        assert_int_equal(mesh->missed, 0);
+        assert_int_equal(ovoid_mesh_components(mesh), ovoid_mesh_components(plain));
+        expect_near(ovoid_mesh_smooth_area(mesh) / ovoid_mesh_smooth_area(plain), 1.0, 1e-4,
+                    "the area");
+        ovoid_mesh_destroy(&plain);
+        ovoid_mesh_destroy(&mesh);
+    }
+    free(bodies);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Atoms without neighbours, as far apart as coordinates allow: work for each, none for the
+ * space between. */
+static void atoms_far_apart(void **state) {
+    test_skip_simulated(*state);
+    enum { ATOMS = 60 };
+    double xyzr[4 * ATOMS];
+    test_random random = {31};
+    const size_t atoms = test_size(ATOMS, 2);
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    for (size_t i = 0; i < atoms; ++i) {
+        for (size_t k = 0; k < 3; ++k)
+            xyzr[4 * i + k] = random_uniform(&random, -1e6, 1e6);
+        xyzr[4 * i + 3] = 1.7;
+    }
+    ovoid_mesh *mesh = mesh_atoms(*state, xyzr, atoms, 0.5, &options);
+    assert_int_equal(ovoid_mesh_components(mesh), atoms);
+    assert_int_equal(expect_closed(mesh), 2 * (int64_t)atoms);
+    expect_near(ovoid_mesh_smooth_area(mesh) / ((double)atoms * 4.0 * PI * 1.7 * 1.7), 1.0, 1e-3,
+                "area");
+    ovoid_mesh_destroy(&mesh);
+}
+
 /* ---- a protein ---------------------------------------------------------------------------- */
 
 static bool file_exists(const char *path) {
@@ -855,10 +1032,17 @@ static void refusals(void **state) {
                  OVOID_ERROR_ARGUMENT, "vertex rule");
     options = options_of(50.0, 0.5, OVOID_VERTEX_EXACT);
     test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
-                 OVOID_ERROR_EMPTY, "below the isovalue 50 everywhere");
-    options = options_of(3.0, 100.0, OVOID_VERTEX_EXACT);
+                 OVOID_ERROR_EMPTY, "nowhere above the isovalue 50");
+    options = options_of(3.0, 1000.0, OVOID_VERTEX_EXACT);
     test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                  OVOID_ERROR_EMPTY, "largest value of the field at a lattice point is 2.87");
+    options = options_of(1.0, 5e-4, OVOID_VERTEX_EXACT);
+    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                 OVOID_ERROR_LIMIT,
+                 "points at a spacing of 0.0005 angstrom, more than 2e+10; use a");
+    options = options_of(0.999, 0.5, OVOID_VERTEX_EXACT);
+    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 1e-9, &options, &mesh),
+                 OVOID_ERROR_LIMIT, "points at a spacing of 0.5 angstrom, more than 2e+10; use a");
     const double spacings[] = {1e-5, 1e-9, 1e-300};
     for (size_t k = 0; k < 3; ++k) {
         options = options_of(1.0, spacings[k], OVOID_VERTEX_EXACT);
@@ -887,13 +1071,20 @@ int main(void) {
         cmocka_unit_test(a_vertex_without_gradient_has_a_normal),
         cmocka_unit_test(pieces_give_the_plain_mesh),
         cmocka_unit_test(exact_vertices_stay_on_their_edges),
-        cmocka_unit_test(values_equal_to_the_isovalue_are_inside),
+        cmocka_unit_test(values_equal_to_the_isovalue_are_outside),
         cmocka_unit_test(far_from_the_origin),
         cmocka_unit_test(memory_follows_the_surface),
         cmocka_unit_test(pieces_reach_as_far_as_the_surface),
         cmocka_unit_test(tips_at_the_ends_of_pieces),
         cmocka_unit_test(two_runs_are_the_same),
         cmocka_unit_test(light_meshes_are_the_same),
+        cmocka_unit_test(small_spheres_have_their_area),
+        cmocka_unit_test(specks_are_found_once),
+        cmocka_unit_test(specks_beside_others),
+        cmocka_unit_test(small_ellipsoids_have_their_volume),
+        cmocka_unit_test(what_is_missed_is_counted),
+        cmocka_unit_test(large_pieces_are_left_alone),
+        cmocka_unit_test(atoms_far_apart),
         cmocka_unit_test(a_protein_is_closed),
         cmocka_unit_test(refusals),
     };

@@ -358,8 +358,8 @@ static void empty_band_is_an_error(void **state) {
     assert_null(samples.value.memory);
 }
 
-/* Two atoms ten thousand angstrom apart: the space between costs nothing where the band ends above
- * 0, and is refused, before memory runs out, where it does not. */
+/* Two atoms five thousand angstrom apart: the space between costs nothing, whether the band ends
+ * above 0 or holds all of the outside. What would cost hours is refused. */
 static void empty_space_between_atoms(void **state) {
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 5000.0, 300.0, 300.0, 1.7};
     const ov_band shell = {.low = 0.02, .high = 2.0}, everything = {.low = 0.0, .high = 2.0};
@@ -370,19 +370,38 @@ static void empty_space_between_atoms(void **state) {
     test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.5, 3.0, &lattice));
     test_check(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, shell, no_questions, &samples));
     const job one = {xyzr, 1, 0.5, 0.5, 3.0, {.low = 0.02, .high = 2.0}};
-    const size_t single = expect_samples(*state, &one);
+    const size_t single = expect_samples(*state, &one), both = samples.points.count;
     /* the steps differ a little from 0.5, and so does the number of points about an atom */
-    assert_true(samples.points.count > 1.9 * (double)single &&
-                samples.points.count < 2.1 * (double)single);
+    assert_true(both > 1.9 * (double)single && both < 2.1 * (double)single);
     ov_samples_destroy(&samples);
-    test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.1, 3.0, &lattice));
+    test_check(*state,
+               ov_sample(*state, xyzr, 2, 0.5, &lattice, everything, no_questions, &samples));
+    assert_true(samples.points.count > both && samples.points.count < 100000);
+    ov_samples_destroy(&samples);
+    test_check(*state, ov_lattice_create(*state, xyzr, 2, 1e-4, 3.0, &lattice));
     uint64_t asked = 0; /* the refusal comes before the first piece */
     const ov_sampling sampling = {stop_at_third, &asked};
     test_refused(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, everything, sampling, &samples),
-                 OVOID_ERROR_LIMIT, "constrained points");
+                 OVOID_ERROR_LIMIT, "points at a spacing of 0.0001 angstrom, more than 2e+10; use");
     assert_int_equal(asked, 0);
-    test_refused(*state, ov_lattice_create(*state, xyzr, 2, 1e-3, 3.0, &lattice), OVOID_ERROR_LIMIT,
-                 "1e12");
+    test_refused(*state, ov_lattice_create(*state, xyzr, 2, 1e-9, 3.0, &lattice), OVOID_ERROR_LIMIT,
+                 "points along an axis");
+}
+
+/* Atoms as far apart as coordinates can be, one of them by itself: as many points about each as
+ * about one that is alone. */
+static void atoms_at_the_ends_of_space(void **state) {
+    const double xyzr[] = {-1e6, 1e6, -1e6, 1.7, 1e6, -1e6, 1e6, 1.7, 1e6, -1e6, 1e6 - 1.4, 1.7};
+    const ov_band shell = {.low = 0.02, .high = 2.0};
+    const job one = {xyzr, 1, 0.5, 0.7, 3.0, {.low = 0.02, .high = 2.0}},
+              pair = {xyzr + 4, 2, 0.5, 0.7, 3.0, {.low = 0.02, .high = 2.0}};
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    test_check(*state, ov_lattice_create(*state, xyzr, 3, 0.7, 3.0, &lattice));
+    test_check(*state, ov_sample(*state, xyzr, 3, 0.5, &lattice, shell, no_questions, &samples));
+    const double wanted = (double)(expect_samples(*state, &one) + expect_samples(*state, &pair));
+    assert_true(samples.points.count > 0.9 * wanted && samples.points.count < 1.1 * wanted);
+    ov_samples_destroy(&samples);
 }
 
 /* Sampling can be stopped between pieces, and leaves nothing behind. */
@@ -414,6 +433,7 @@ int main(void) {
         cmocka_unit_test(band_follows_the_sum),
         cmocka_unit_test(empty_band_is_an_error),
         cmocka_unit_test(empty_space_between_atoms),
+        cmocka_unit_test(atoms_at_the_ends_of_space),
         cmocka_unit_test(sampling_can_be_stopped),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);

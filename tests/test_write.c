@@ -15,6 +15,7 @@ static const double axes[3] = {3.0, 5.0, 2.0}, centre[3] = {112.25, -30.5, 7.75}
 
 static ovoid_context *context;
 static ovoid_mesh *mesh;
+static bool is_ellipsoid = true; /* what is read is about `centre`, and precise */
 
 static int make_mesh(void **state) {
     (void)state;
@@ -69,6 +70,13 @@ static double take_float(cursor *c) {
     return (double)value;
 }
 
+static double take_double(cursor *c) {
+    const uint64_t low = take(c, 4), bits = (uint64_t)take(c, 4) << 32 | low;
+    double value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
 /* The next line of text, without its end. */
 static const char *take_line(cursor *c, char line[256]) {
     size_t length = 0;
@@ -107,16 +115,18 @@ static void soup_free(soup *s) {
 static soup read_ply(cursor *c) {
     char line[256];
     size_t vertices = 0, triangles = 0;
+    bool doubles = false;
     assert_string_equal(take_line(c, line), "ply");
     assert_string_equal(take_line(c, line), "format binary_little_endian 1.0");
     while (strcmp(take_line(c, line), "end_header") != 0) {
         (void)sscanf(line, "element vertex %zu", &vertices);
         (void)sscanf(line, "element face %zu", &triangles);
+        doubles |= strcmp(line, "property double x") == 0;
     }
     soup s = soup_make(vertices, triangles);
     for (size_t i = 0; i < vertices; i++) {
         for (size_t k = 0; k < 3; k++)
-            s.xyz[3 * i + k] = take_float(c);
+            s.xyz[3 * i + k] = doubles ? take_double(c) : take_float(c);
         for (size_t k = 0; k < 3; k++)
             s.normals[3 * i + k] = take_float(c);
     }
@@ -194,6 +204,8 @@ static soup read_stl(cursor *c) {
             e[0][k] = x[3 + k] - x[k];
             e[1][k] = x[6 + k] - x[k];
         }
+        if (!is_ellipsoid)
+            continue;
         assert_true(fabs(n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0) < 1e-5);
         for (int k = 0; k < 2; k++)
             assert_true(fabs(n[0] * e[k][0] + n[1] * e[k][1] + n[2] * e[k][2]) < 1e-4);
@@ -285,6 +297,9 @@ static soup read_glb(cursor *c) {
     c->at = at;
     for (size_t i = 0; i < corners; i++)
         s.corners[i] = take(c, 4);
+    const cJSON *moved = cJSON_GetObjectItem(element(json, "nodes", 0), "translation");
+    for (size_t i = 0; moved && i < 3 * vertices; i++)
+        s.xyz[i] += cJSON_GetArrayItem(moved, (int)(i % 3))->valuedouble;
     cJSON_Delete(json);
     return s;
 }
@@ -379,6 +394,153 @@ static void locale_changes_nothing(void **state) {
     }
 }
 
+/* ---- after equal vertices are merged ------------------------------------------------------- */
+
+static const double *places; /* what is sorted */
+
+static int by_place(const void *a, const void *b) {
+    const double *const p = places + 3 * *(const size_t *)a, *const q =
+                                                                 places + 3 * *(const size_t *)b;
+    for (int k = 0; k < 3; k++)
+        if (p[k] != q[k])
+            return p[k] < q[k] ? -1 : 1;
+    return 0;
+}
+
+static int by_key(const void *a, const void *b) {
+    const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Gives equal vertices one number; returns how many are left. */
+static size_t merge_equal(soup *s) {
+    size_t *const order = test_alloc(s->vertices, sizeof *order), left = 0;
+    uint32_t *const name = test_alloc(s->vertices, sizeof *name);
+    for (size_t v = 0; v < s->vertices; v++)
+        order[v] = v;
+    places = s->xyz;
+    qsort(order, s->vertices, sizeof *order, by_place);
+    for (size_t k = 0; k < s->vertices; k++) {
+        left += k == 0 || by_place(&order[k], &order[k - 1]) != 0;
+        name[order[k]] = (uint32_t)left - 1;
+    }
+    for (size_t k = 0; k < 3 * s->triangles; k++)
+        s->corners[k] = name[s->corners[k]];
+    free(order);
+    free(name);
+    return left;
+}
+
+/* From the coordinates before vertices had new numbers. */
+static void expect_area(const soup *s) {
+    for (size_t t = 0; t < s->triangles; t++) {
+        double u[3], v[3];
+        for (int k = 0; k < 3; k++) {
+            const double from = s->xyz[3 * (size_t)s->corners[3 * t] + (size_t)k];
+            u[k] = s->xyz[3 * (size_t)s->corners[3 * t + 1] + (size_t)k] - from;
+            v[k] = s->xyz[3 * (size_t)s->corners[3 * t + 2] + (size_t)k] - from;
+        }
+        assert_true(u[1] * v[2] != u[2] * v[1] || u[2] * v[0] != u[0] * v[2] ||
+                    u[0] * v[1] != u[1] * v[0]);
+    }
+}
+
+/* Each edge has two triangles, which run along it in opposite directions. */
+static void expect_watertight(const soup *s) {
+    const size_t sides = 3 * s->triangles;
+    uint64_t *const forward = test_alloc(sides, sizeof *forward), *const backward = test_alloc(
+                                                                      sides, sizeof *backward);
+    for (size_t k = 0; k < sides; k++) {
+        const uint64_t a = s->corners[k], b = s->corners[k % 3 == 2 ? k - 2 : k + 1];
+        assert_true(a != b);
+        forward[k] = a << 32 | b;
+        backward[k] = b << 32 | a;
+    }
+    qsort(forward, sides, sizeof *forward, by_key);
+    qsort(backward, sides, sizeof *backward, by_key);
+    for (size_t k = 0; k < sides; k++) {
+        assert_true(k == 0 || forward[k] != forward[k - 1]);
+        assert_true(forward[k] == backward[k]);
+    }
+    free(forward);
+    free(backward);
+}
+
+/* Atoms whose surfaces pass through lattice points, or by them as near as rounding can tell; and
+ * what a format says where its floats are too coarse, NULL where it writes in any case. */
+static const struct {
+    double x, y, z, radius, spacing;
+    ovoid_vertex_rule vertices;
+    const char *refused[2]; /* by STL, by glTF */
+} touching[] = {
+    {0.0, 0.0, 0.0, 1.0, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {0.0, 0.0, 0.0, 2.0, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {0.0, 0.0, 0.0, 2.0, 0.5, OVOID_VERTEX_LINEAR, {NULL, NULL}},
+    {3.0, -7.5, 0.5, 1.5, 0.1, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {64.5, 100.0, -33.0, 2.5, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {0.0, 0.0, 0.0, 2.0 + 1e-7, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {0.0, 0.0, 0.0, 2.0 - 1e-7, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {1e-6, -1e-6, 1e-6, 2.0, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {1000.0, -1000.0, 2000.0, 2.5, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {99999.5, -1e5, 1e5, 2.5, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {1e5, 1e5, 1e5, 2.0, 0.125, OVOID_VERTEX_EXACT, {NULL, NULL}},
+    {1e6, -1e6, 1e6, 2.0, 0.25, OVOID_VERTEX_EXACT, {"write .ply, or move the molecule", NULL}},
+    {99.0,
+     -1e6,
+     1e6,
+     1.3,
+     0.03125,
+     OVOID_VERTEX_LINEAR,
+     {"write .ply, or move the molecule", NULL}},
+    {0.0, 0.0, 0.0, 0.2, 0.5, OVOID_VERTEX_EXACT, {NULL, NULL}},
+};
+
+static ovoid_mesh *mesh_touching(size_t k) {
+    const double xyzr[4] = {touching[k].x, touching[k].y, touching[k].z, touching[k].radius};
+    ovoid_molecule *molecule = NULL;
+    ovoid_mesh *made = NULL;
+    ovoid_mesh_options options;
+    ovoid_mesh_options_init(&options);
+    options.spacing = touching[k].spacing;
+    options.vertices = touching[k].vertices;
+    test_check(context, ovoid_molecule_create(context, xyzr, 1, &molecule));
+    test_check(context, ovoid_molecule_mesh(context, molecule, 0.5, &options, &made));
+    ovoid_molecule_destroy(&molecule);
+    return made;
+}
+
+static void expect_closed_file(const char *path, const format *f, const ovoid_mesh *made) {
+    test_check(context, ovoid_mesh_write(context, made, path));
+    cursor c = load(path);
+    soup s = f->read(&c);
+    expect_area(&s);
+    assert_int_equal(merge_equal(&s), ovoid_mesh_vertices(made));
+    expect_watertight(&s);
+    soup_free(&s);
+    free(c.data);
+}
+
+static void merging_equal_vertices_leaves_no_holes(void **state) {
+    is_ellipsoid = false;
+    test_check(context, ovoid_context_open_device(context, NULL));
+    for (size_t k = 0; k < sizeof touching / sizeof *touching; k++) {
+        ovoid_mesh *made = mesh_touching(k);
+        for (size_t i = 0; i < FORMATS; i++) {
+            const char *path = scratch_path(*state, formats[i].name);
+            const char *refused = formats[i].read == read_stl   ? touching[k].refused[0]
+                                  : formats[i].read == read_glb ? touching[k].refused[1]
+                                                                : NULL;
+            if (refused)
+                test_refused(context, ovoid_mesh_write(context, made, path), OVOID_ERROR_LIMIT,
+                             refused);
+            else
+                expect_closed_file(path, &formats[i], made);
+        }
+        ovoid_mesh_destroy(&made);
+    }
+    is_ellipsoid = true;
+}
+
 /* What `assimp info` says after `label`. */
 static void find_info(const char *text, const char *label, double *values, int count) {
     const char *at = strstr(text, label);
@@ -463,13 +625,10 @@ static void meshes_without_triangles_are_empty(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        IN_SCRATCH(every_format_reads_back),
-        IN_SCRATCH(equal_meshes_give_equal_bytes),
-        IN_SCRATCH(locale_changes_nothing),
-        IN_SCRATCH(assimp_reads_every_format),
-        IN_SCRATCH(unknown_extensions_are_refused),
-        IN_SCRATCH(failures_leave_nothing),
-        IN_SCRATCH(meshes_without_triangles_are_empty),
+        IN_SCRATCH(every_format_reads_back),   IN_SCRATCH(equal_meshes_give_equal_bytes),
+        IN_SCRATCH(locale_changes_nothing),    IN_SCRATCH(merging_equal_vertices_leaves_no_holes),
+        IN_SCRATCH(assimp_reads_every_format), IN_SCRATCH(unknown_extensions_are_refused),
+        IN_SCRATCH(failures_leave_nothing),    IN_SCRATCH(meshes_without_triangles_are_empty),
     };
     return cmocka_run_group_tests(tests, make_mesh, drop_mesh);
 }

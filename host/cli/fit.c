@@ -216,24 +216,54 @@ static int write_outputs(fit_job *job) {
     return code;
 }
 
+const char *fit_unreached(const fit_job *job, char text[FIT_REASON_TEXT]) {
+    const ovoid_adaptive_options *wanted = &job->options.adaptive;
+    const ovoid_fit_result *result = &job->levels[0].result;
+    char digits[FIT_DISTANCE_TEXT];
+    switch (result->verdict) {
+    case OVOID_VERDICT_REACHED:
+        return NULL;
+    case OVOID_VERDICT_NO_SURFACE:
+        snprintf(text, FIT_REASON_TEXT,
+                 "there is no surface to be near to: the molecule's field is "
+                 "nowhere above the isovalue %.9g",
+                 job->options.isovalue);
+        break;
+    case OVOID_VERDICT_NO_MODEL_SURFACE:
+        snprintf(text, FIT_REASON_TEXT, "the model has no surface to be within %.9g Å",
+                 wanted->tolerance);
+        break;
+    case OVOID_VERDICT_COARSE:
+        snprintf(
+            text, FIT_REASON_TEXT,
+            "a mesh spacing of %.9g Å is too coarse to tell whether the surfaces are within %.9g "
+            "Å",
+            wanted->mesh_spacing, wanted->tolerance);
+        break;
+    case OVOID_VERDICT_MISSED:
+        if (wanted->goal == OVOID_GOAL_TOLERANCE)
+            snprintf(text, FIT_REASON_TEXT, "the outer surfaces are %s Å apart, not within %.9g Å",
+                     fit_distance(result->distance, wanted->tolerance, digits), wanted->tolerance);
+        else
+            snprintf(text, FIT_REASON_TEXT, "the model has %llu ellipsoid%s",
+                     (unsigned long long)result->ellipsoids, result->ellipsoids == 1 ? "" : "s");
+        break;
+    }
+    return text;
+}
+
 /* Says what was reached instead of the goal. */
 static int compare_with_goal(const fit_job *job) {
     const ovoid_adaptive_options *wanted = &job->options.adaptive;
-    const ovoid_fit_result *result = &job->levels[0].result;
-    char text[FIT_DISTANCE_TEXT];
-    if (result->reached)
+    char text[FIT_REASON_TEXT];
+    const char *reason = fit_unreached(job, text);
+    const bool missed = job->levels[0].result.verdict == OVOID_VERDICT_MISSED &&
+                        wanted->goal == OVOID_GOAL_TOLERANCE;
+    if (!reason)
         return CLI_OK;
-    if (wanted->goal != OVOID_GOAL_TOLERANCE)
-        cli_warning("the goal was not reached: the model has %llu ellipsoid%s",
-                    (unsigned long long)result->ellipsoids, result->ellipsoids == 1 ? "" : "s");
-    else if (isnan(result->distance))
-        cli_warning("the goal was not reached: the model has no surface to be within %.9g Å",
-                    wanted->tolerance);
-    else
-        cli_warning("the goal was not reached: the outer surfaces are %s Å apart, not within %.9g "
-                    "Å; this is the best model found%s",
-                    fit_distance(result->distance, wanted->tolerance, text), wanted->tolerance,
-                    wanted->effort < 10 ? ", and a higher --effort may find a better one" : "");
+    cli_warning(
+        "the goal was not reached: %s%s%s", reason, missed ? "; this is the best model found" : "",
+        missed && wanted->effort < 10 ? ", and a higher --effort may find a better one" : "");
     return CLI_GOAL;
 }
 

@@ -108,6 +108,10 @@ double fit_fit_seconds(const fit_job *job);
 enum { FIT_DISTANCE_TEXT = 32 };
 const char *fit_distance(double distance, double above, char text[FIT_DISTANCE_TEXT]);
 
+/* Why the goal was not reached, NULL where it was. */
+enum { FIT_REASON_TEXT = 160 };
+const char *fit_unreached(const fit_job *job, char text[FIT_REASON_TEXT]);
+
 /* ---- fit_notes.c, owners.c ------------------------------------------------------------------- */
 
 /* The model's header says where it comes from. */

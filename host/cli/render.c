@@ -446,7 +446,7 @@ static int write_picture(render_job *job) {
         return cli_failure(job->context, status, CLI_OUTPUT);
     if (ovoid_image_covered(job->image) == 0 && !job->quiet)
         cli_warning("there is no surface in the picture: the isovalue %g is above the field's "
-                    "maximum, or the surface is out of sight",
+                    "maximum, or the surface is out of sight or smaller than a pixel",
                     job->options.isovalue);
     if (!job->quiet)
         print_summary(job);

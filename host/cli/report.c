@@ -76,6 +76,10 @@ static void add_goal(builder *b, const fit_job *job) {
     add_number(&goal, "asked", cli_number_value(number, &job->options));
     goal.good = goal.good && cJSON_AddBoolToObject(goal.object, "reached", result->reached);
     add_finite(&goal, "distance", result->distance);
+    char text[FIT_REASON_TEXT];
+    const char *reason = fit_unreached(job, text);
+    if (reason)
+        add_string(&goal, "reason", reason);
     b->good = goal.good;
 }
 

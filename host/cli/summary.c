@@ -44,7 +44,7 @@ static void print_goal(FILE *out, const fit_job *job) {
     const ovoid_adaptive_options *wanted = &job->options.adaptive;
     const char *reached = result->reached ? "reached" : "not reached";
     const bool tolerance = wanted->goal == OVOID_GOAL_TOLERANCE;
-    char text[FIT_DISTANCE_TEXT];
+    char text[FIT_DISTANCE_TEXT], reason[FIT_REASON_TEXT];
     fputs("goal      ", out);
     if (tolerance)
         fprintf(out, "outer surfaces within %.9g Å: ", wanted->tolerance);
@@ -52,11 +52,14 @@ static void print_goal(FILE *out, const fit_job *job) {
         fprintf(out, "%u ellipsoid%s: ", (unsigned)wanted->ellipsoids, plural(wanted->ellipsoids));
     else
         fprintf(out, "%.9g ellipsoids per atom: ", wanted->ratio);
-    if (isfinite(result->distance))
+    if (tolerance && result->verdict != OVOID_VERDICT_REACHED &&
+        result->verdict != OVOID_VERDICT_MISSED)
+        fprintf(out, "%s: %s\n", reached, fit_unreached(job, reason));
+    else if (isfinite(result->distance))
         fprintf(out, "%s, %s%s Å\n", reached, tolerance ? "" : "outer surfaces within ",
                 fit_distance(result->distance, wanted->tolerance, text));
     else
-        fprintf(out, tolerance && result->reached ? "there is no surface\n" : "%s\n", reached);
+        fprintf(out, "%s\n", reached);
 }
 
 static void print_measure(FILE *out, bool known, int width, double value) {

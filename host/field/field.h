@@ -185,8 +185,9 @@ typedef struct ov_sampling {
     void *user;
 } ov_sampling;
 
-/* Evaluates phi on the lattice piece by piece and keeps the band. OVOID_ERROR_EMPTY when no lattice
- * point lies in it, OVOID_ERROR_LIMIT when the device has no room for the points,
+/* Evaluates phi on the lattice piece by piece and keeps the band. Where atoms are far apart, the
+ * space between them, which no atom reaches, has no points. OVOID_ERROR_EMPTY when no lattice point
+ * lies in the band, OVOID_ERROR_LIMIT when the device has no room for the points,
  * OVOID_ERROR_CANCELLED when go_on says so. */
 ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
                        const ov_lattice *lattice, ov_band band, ov_sampling sampling,

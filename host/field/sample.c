@@ -1,21 +1,11 @@
 #include "field/bricks.h"
+#include "field/piece_grid.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Largest piece of the lattice that is evaluated at once: a million points, 16 MB on the device. */
-static const uint64_t piece_limit[3] = {128, 128, 64};
 static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
-
-/* The lattice cut into equal pieces of whole bricks; the last pieces may reach past its end. */
-typedef struct piece_grid {
-    uint64_t size[3];  /* lattice points of a piece */
-    uint64_t count[3]; /* pieces per axis */
-    uint64_t total;
-    size_t *start; /* atoms of piece p: atom[start[p]] .. atom[start[p + 1] - 1] */
-    uint32_t *atom;
-} piece_grid;
 
 /* Bytes on the device per constrained point: coordinates, phi, its gradient, and what a fit adds.
  */
@@ -29,7 +19,7 @@ typedef struct sampler {
     ov_band band;
     ov_sampling sampling;
     double origin[3]; /* of the kept points */
-    piece_grid pieces;
+    ov_piece_grid pieces;
     ov_points points; /* of one piece, relative to its corner */
     ov_terms terms;
     ov_lists lists;
@@ -45,9 +35,11 @@ typedef struct sampler {
     uint64_t kept_limit;
 } sampler;
 
+/* Lattice points along an axis at most; numbers of pieces stay exact. */
+#define STEPS_MOST 1e12
+
 ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_t atoms,
                                double spacing, double padding, ov_lattice *lattice) {
-    double total = 1.0;
     for (size_t axis = 0; axis < 3; ++axis) {
         double low = xyzr[axis], high = xyzr[axis];
         for (size_t i = 1; i < atoms; ++i) {
@@ -57,12 +49,12 @@ ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_
         low -= padding;
         high += padding;
         const double steps = fmax(1.0, ceil((high - low) / spacing - 1e-9));
-        total *= steps;
-        if (!(total < 1e12))
-            return ov_fail(context, OVOID_ERROR_LIMIT,
-                           "the lattice of constrained points would have more than 1e12 points "
-                           "(spacing %g angstrom)",
-                           spacing);
+        if (!(steps < STEPS_MOST))
+            return ov_fail(
+                context, OVOID_ERROR_LIMIT,
+                "the lattice of constrained points would have %.1e points along an axis at a "
+                "spacing of %g angstrom, more than %.0e; use a larger spacing",
+                steps, spacing, STEPS_MOST);
         lattice->low[axis] = low;
         lattice->size[axis] = (uint64_t)steps;
         lattice->step[axis] = (high - low) / steps;
@@ -73,76 +65,6 @@ ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_
 /* Coordinate of lattice index i = 0 .. size - 1; the paper counts from 1. */
 static double coordinate(const ov_lattice *lattice, size_t axis, uint64_t i) {
     return lattice->low[axis] + (double)(i + 1) * lattice->step[axis];
-}
-
-static void plan_pieces(const ov_lattice *lattice, piece_grid *pieces) {
-    pieces->total = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-        const uint64_t size = lattice->size[axis];
-        const uint64_t count = (size + piece_limit[axis] - 1) / piece_limit[axis];
-        const uint64_t bricks = (size + count * brick[axis] - 1) / (count * brick[axis]);
-        pieces->size[axis] = bricks * brick[axis];
-        pieces->count[axis] = (size + pieces->size[axis] - 1) / pieces->size[axis];
-        pieces->total *= pieces->count[axis];
-    }
-}
-
-/* Range of pieces along one axis that an atom of this reach touches; empty if first > last. */
-static void piece_range(const sampler *s, size_t axis, double centre, double reach, int64_t *first,
-                        int64_t *last) {
-    const ov_lattice *const lattice = s->lattice;
-    const double width = lattice->step[axis] * (double)s->pieces.size[axis];
-    const double from = coordinate(lattice, axis, 0);
-    *first = (int64_t)fmax(0.0, floor((centre - reach - from) / width - 1e-6));
-    *last = (int64_t)fmin((double)s->pieces.count[axis] - 1.0,
-                          floor((centre + reach - from) / width + 1e-6));
-}
-
-/* Calls back for each piece that the atom reaches: counts it, or stores the atom. */
-static void visit_pieces(sampler *s, uint32_t atom, bool store, size_t *cursor) {
-    const double *const a = s->xyzr + 4 * (size_t)atom;
-    const double reach = sqrt(a[3] * a[3] - log(OV_TARGET_CUTOFF) / s->decay);
-    int64_t first[3], last[3];
-    for (size_t axis = 0; axis < 3; ++axis)
-        piece_range(s, axis, a[axis], reach, &first[axis], &last[axis]);
-    for (int64_t z = first[2]; z <= last[2]; ++z)
-        for (int64_t y = first[1]; y <= last[1]; ++y)
-            for (int64_t x = first[0]; x <= last[0]; ++x) {
-                const uint64_t piece =
-                    ((uint64_t)z * s->pieces.count[1] + (uint64_t)y) * s->pieces.count[0] +
-                    (uint64_t)x;
-                if (store)
-                    s->pieces.atom[cursor[piece]++] = atom;
-                else
-                    ++s->pieces.start[piece + 1];
-            }
-}
-
-/* Sorts the atoms into the pieces that they reach. */
-static ovoid_status bin_atoms(ovoid_context *context, sampler *s) {
-    piece_grid *const pieces = &s->pieces;
-    size_t *cursor = NULL;
-    pieces->start = ov_alloc(context, pieces->total + 1, sizeof *pieces->start, "lattice pieces");
-    cursor = ov_alloc(context, pieces->total, sizeof *cursor, "lattice pieces");
-    if (!pieces->start || !cursor)
-        goto fail;
-    for (uint32_t i = 0; i < s->atoms; ++i)
-        visit_pieces(s, i, false, NULL);
-    for (uint64_t p = 0; p < pieces->total; ++p) {
-        cursor[p] = pieces->start[p];
-        pieces->start[p + 1] += pieces->start[p];
-    }
-    pieces->atom =
-        ov_alloc(context, pieces->start[pieces->total], sizeof *pieces->atom, "atoms of pieces");
-    if (!pieces->atom)
-        goto fail;
-    for (uint32_t i = 0; i < s->atoms; ++i)
-        visit_pieces(s, i, true, cursor);
-    free(cursor);
-    return OVOID_OK;
-fail:
-    free(cursor);
-    return OVOID_ERROR_MEMORY;
 }
 
 /* The bricks of a piece, along a curve, as the tree over them wants it; the same for all pieces
@@ -163,7 +85,7 @@ static ovoid_status lay_piece(ovoid_context *context, sampler *s) {
 }
 
 /* phi at the points of one piece, into s->values. */
-static ovoid_status evaluate_piece(ovoid_context *context, sampler *s, uint64_t piece,
+static ovoid_status evaluate_piece(ovoid_context *context, sampler *s, size_t piece,
                                    const uint64_t at[3]) {
     ovoid_status status = OVOID_OK;
     const size_t first = s->pieces.start[piece], count = s->pieces.start[piece + 1] - first;
@@ -200,16 +122,15 @@ static ovoid_status check_room(ovoid_context *context, const sampler *s, uint64_
                    (unsigned long long)points, (unsigned long long)s->kept_limit);
 }
 
-/* Points on the lattice within the piece of this number, those whose indices are multiples of
- * step. */
-static uint64_t points_in_piece(const sampler *s, uint64_t piece, uint64_t step) {
-    uint64_t points = 1;
+/* Points on the lattice within the piece, those whose indices are multiples of step. */
+static uint64_t points_in_piece(const sampler *s, size_t piece, uint64_t step) {
+    uint64_t points = 1, at[3];
+    ov_piece_grid_at(&s->pieces, piece, at);
     for (int axis = 0; axis < 3; ++axis) {
-        const uint64_t first = piece % s->pieces.count[axis] * s->pieces.size[axis];
+        const uint64_t first = at[axis] * s->pieces.size[axis];
         const uint64_t left = s->lattice->size[axis] - first;
         const uint64_t end = first + (left < s->pieces.size[axis] ? left : s->pieces.size[axis]);
         points *= (end + step - 1) / step - (first + step - 1) / step;
-        piece /= s->pieces.count[axis];
     }
     return points;
 }
@@ -226,7 +147,7 @@ static ovoid_status check_empty_pieces(ovoid_context *context, const sampler *s)
     const uint64_t step = s->band.low <= 0.0 ? 1 : s->band.outside_every;
     if (lowest(s->band) > 0.0)
         return OVOID_OK;
-    for (uint64_t p = 0; p < s->pieces.total; ++p)
+    for (size_t p = 0; p < s->pieces.pieces; ++p)
         if (s->pieces.start[p] == s->pieces.start[p + 1])
             points += points_in_piece(s, p, step);
     return check_room(context, s, points);
@@ -292,18 +213,17 @@ static ovoid_status ask_to_go_on(ovoid_context *context, const sampler *s) {
 
 static ovoid_status sample_pieces(ovoid_context *context, sampler *s) {
     ovoid_status status = OVOID_OK;
-    uint64_t piece = 0;
-    for (uint64_t z = 0; z < s->pieces.count[2]; ++z)
-        for (uint64_t y = 0; y < s->pieces.count[1]; ++y)
-            for (uint64_t x = 0; x < s->pieces.count[0]; ++x, ++piece) {
-                const uint64_t at[3] = {x * s->pieces.size[0], y * s->pieces.size[1],
-                                        z * s->pieces.size[2]};
-                if (s->pieces.start[piece] == s->pieces.start[piece + 1] && lowest(s->band) > 0.0)
-                    continue; /* far outside, and the band has no such points */
-                OV_TRY(evaluate_piece(context, s, piece, at));
-                OV_TRY(keep_band(context, s, at));
-                OV_TRY(ask_to_go_on(context, s));
-            }
+    for (size_t piece = 0; piece < s->pieces.pieces; ++piece) {
+        uint64_t at[3];
+        if (s->pieces.start[piece] == s->pieces.start[piece + 1] && lowest(s->band) > 0.0)
+            continue; /* far outside, and the band has no such points */
+        ov_piece_grid_at(&s->pieces, piece, at);
+        for (int axis = 0; axis < 3; ++axis)
+            at[axis] *= s->pieces.size[axis];
+        OV_TRY(evaluate_piece(context, s, piece, at));
+        OV_TRY(keep_band(context, s, at));
+        OV_TRY(ask_to_go_on(context, s));
+    }
     if (s->band_count == 0) /* guards alone say nothing about the surface */
         status = ov_fail(context, OVOID_ERROR_EMPTY,
                          "no lattice point has a field between %g and %g; use a smaller spacing or "
@@ -348,8 +268,7 @@ cleanup:
 
 static void destroy_sampler(sampler *s) {
     drop_pieces(s);
-    free(s->pieces.start);
-    free(s->pieces.atom);
+    ov_piece_grid_destroy(&s->pieces);
     free(s->order);
     free(s->quadrics);
     ov_terms_destroy(&s->terms);
@@ -374,8 +293,8 @@ ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms,
             lattice->low[axis] + 0.5 * lattice->step[axis] * (double)lattice->size[axis];
     OV_TRY(ov_device_get(context, &device));
     s.kept_limit = device->info.global_memory / BYTES_PER_POINT;
-    plan_pieces(lattice, &s.pieces);
-    OV_TRY(bin_atoms(context, &s));
+    OV_TRY(
+        ov_piece_grid_create(context, lattice, xyzr, atoms, decay, lowest(band) <= 0.0, &s.pieces));
     OV_TRY(check_empty_pieces(context, &s));
     OV_TRY(lay_piece(context, &s));
     OV_TRY(sample_pieces(context, &s));

@@ -73,14 +73,17 @@ cleanup:
     return status;
 }
 
+static size_t count_of_ratio(const ov_adaptive *f) {
+    return (size_t)fmax(1.0, round(f->options->adaptive.ratio * (double)f->atoms));
+}
+
 static ovoid_status reach_goal(ov_adaptive *f, ov_trial *best) {
     const ovoid_adaptive_options *const wanted = &f->options->adaptive;
     switch (wanted->goal) {
     case OVOID_GOAL_ELLIPSOIDS:
         return ov_adaptive_count(f, (size_t)wanted->ellipsoids, best);
     case OVOID_GOAL_RATIO:
-        return ov_adaptive_count(f, (size_t)fmax(1.0, round(wanted->ratio * (double)f->atoms)),
-                                 best);
+        return ov_adaptive_count(f, count_of_ratio(f), best);
     case OVOID_GOAL_TOLERANCE:
         break;
     }
@@ -138,11 +141,40 @@ cleanup:
     return status;
 }
 
+/* Meshes tell how near surfaces are where they are finer than the tolerance, or than what a
+ * Gaussian of the decay rate can have for features: so many of its widths. */
+#define COARSEST 2.0
+
+static bool is_coarse(const ov_adaptive *f) {
+    const double spacing = f->options->adaptive.mesh_spacing;
+    return (spacing > f->options->adaptive.tolerance && spacing * f->judge.root_2d > COARSEST) ||
+           (f->judge.mesh && f->judge.mesh->missed > 0);
+}
+
+/* A goal is reached only where it was measured. */
+static ovoid_verdict verdict_of(const ov_adaptive *f, size_t count, const ov_judgement *judgement) {
+    const ovoid_adaptive_options *const wanted = &f->options->adaptive;
+    switch (wanted->goal) {
+    case OVOID_GOAL_ELLIPSOIDS:
+        return count == wanted->ellipsoids ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
+    case OVOID_GOAL_RATIO:
+        return count == count_of_ratio(f) ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
+    case OVOID_GOAL_TOLERANCE:
+        break;
+    }
+    if (is_coarse(f))
+        return OVOID_VERDICT_COARSE;
+    if (!f->judge.mesh)
+        return OVOID_VERDICT_NO_SURFACE;
+    if (!judgement->valid)
+        return OVOID_VERDICT_NO_MODEL_SURFACE;
+    return judgement->deviation <= wanted->tolerance ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
+}
+
 /* The last judgement, and the model in the paper's parameters. */
 static ovoid_status finish(ov_adaptive *f, ov_trial *best, ovoid_ellipsoid **ellipsoids,
                            ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
-    const ovoid_adaptive_options *const wanted = &f->options->adaptive;
     ov_judgement judgement;
     ov_adaptive_quadrics(f, best);
     OV_TRY(calibrate(f, best->count, &judgement));
@@ -156,9 +188,9 @@ static ovoid_status finish(ov_adaptive *f, ov_trial *best, ovoid_ellipsoid **ell
     result->ellipsoids = best->count;
     result->iterations = f->steps;
     result->solver_iterations = f->refiner.solver.iterations + f->local.refiner.solver.iterations;
-    result->distance = judgement.valid ? judgement.deviation : NAN;
-    result->reached = wanted->goal != OVOID_GOAL_TOLERANCE || !f->judge.mesh ||
-                      (judgement.valid && judgement.deviation <= wanted->tolerance);
+    result->distance = judgement.valid && !is_coarse(f) ? judgement.deviation : NAN;
+    result->verdict = verdict_of(f, best->count, &judgement);
+    result->reached = result->verdict == OVOID_VERDICT_REACHED;
 cleanup:
     return status;
 }

@@ -14,14 +14,12 @@
 /* Where spots are looked for, distances below this share of theirs are only bounded. */
 #define ENOUGH 0.8
 
-static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
-
 /* The light mesh of some bodies, its area and its volume; the normals have done their part then.
  * *mesh is NULL where there is no surface. */
 static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
                                 ovoid_mesh **mesh, ov_content *content) {
-    const ovoid_status status = ov_march_light(judge->context, bodies, count, &judge->meshing,
-                                               piece_limit, judge->origin, &judge->watch, mesh);
+    const ovoid_status status = ov_mesh_bodies_light(judge->context, bodies, count, &judge->meshing,
+                                                     judge->origin, &judge->watch, mesh);
     if (status == OVOID_OK) {
         if (content)
             *content = ov_mesh_smooth(*mesh, false);
@@ -91,7 +89,10 @@ static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size
     }
     const ovoid_status status = mesh_bodies(judge, bodies, count, mesh, content);
     free(bodies);
-    return status;
+    if (status != OVOID_ERROR_LIMIT)
+        return status;
+    *mesh = NULL; /* what was merged across empty space is no surface to compare with */
+    return OVOID_OK;
 }
 
 static int by_distance(const void *a, const void *b) {

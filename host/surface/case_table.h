@@ -1,6 +1,6 @@
 /*
  * Marching cubes' table: for each of the 256 ways in which the corners of a cell can lie inside
- * (phi >= c) or outside, the triangles that separate them. Made by a rule, not copied from a table:
+ * (phi > c) or outside, the triangles that separate them. Made by a rule, not copied from a table:
  * see case_table.c.
  */
 #ifndef OV_CASE_TABLE_H

@@ -4,6 +4,7 @@
 #include "surface/brick_grid.h"
 #include "surface/case_table.h"
 #include "surface/mesh.h"
+#include "surface/specks.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -64,6 +65,8 @@ typedef struct marcher {
     float *offsets; /* with these in place of xyz if it is light */
     float *normals;
     uint32_t *triangle;
+    uint8_t *edge_of; /* of the mesh's vertices, unless it is light */
+    size_t edge_of_capacity, missed;
     size_t xyz_capacity, offsets_capacity, normals_capacity, triangle_capacity;
     size_t vertices, triangles;
     size_t new_vertices, new_triangles; /* of the piece */
@@ -436,6 +439,9 @@ static ovoid_status grow_vertices(ovoid_context *context, marcher *m, size_t tot
                        "vertices"));
     else
         OV_TRY(ov_grow(context, &m->xyz, &m->xyz_capacity, 3 * total, sizeof *m->xyz, "vertices"));
+    if (!m->origin)
+        OV_TRY(ov_grow(context, &m->edge_of, &m->edge_of_capacity, total, sizeof *m->edge_of,
+                       "vertices"));
     OV_TRY(ov_grow(context, &m->normals, &m->normals_capacity, 3 * total, sizeof *m->normals,
                    "normals"));
 cleanup:
@@ -464,6 +470,8 @@ static ovoid_status take_vertices(ovoid_context *context, marcher *m, size_t pac
         const float *const n = normal + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
         cl_uint at[3];
         const cl_uint along = read_edge(m->edges[k], at);
+        if (m->edge_of)
+            m->edge_of[m->vertices + k] = (uint8_t)along;
         for (cl_uint axis = 0; axis < 3; ++axis) {
             const int64_t index =
                 m->pieces.origin[axis] + (int64_t)(m->at[axis] * m->pieces.size[axis] + at[axis]);
@@ -534,7 +542,7 @@ static ovoid_status note_largest(ovoid_context *context, marcher *m) {
 static ovoid_status fail_empty(ovoid_context *context, const marcher *m) {
     if (m->pieces.pieces == 0)
         return ov_fail(context, OVOID_ERROR_EMPTY,
-                       "no surface: the field is below the isovalue %g everywhere",
+                       "no surface: the field is nowhere above the isovalue %g",
                        m->options->isovalue);
     return ov_fail(context, OVOID_ERROR_EMPTY,
                    "no surface: the largest value of the field at a lattice point is %g, and the "
@@ -556,9 +564,103 @@ static ovoid_status march_pieces(ovoid_context *context, marcher *m) {
         if (m->vertices == 0)
             OV_TRY(note_largest(context, m));
     }
-    if (m->vertices == 0)
-        status = fail_empty(context, m);
 cleanup:
+    return status;
+}
+
+static double coordinate(const marcher *m, size_t vertex, size_t axis) {
+    return m->origin ? (double)m->offsets[3 * vertex + axis] : m->xyz[3 * vertex + axis];
+}
+
+/* ---- what the lattice does not meet ------------------------------------------------------- */
+
+static void vertex_at(size_t vertex, double xyz[3], const void *user) {
+    const marcher *const m = user;
+    for (size_t k = 0; k < 3; ++k)
+        xyz[k] = coordinate(m, vertex, k) + (m->origin ? m->origin[k] : 0.0);
+}
+
+/* Drops the vertices that are replaced, and their triangles. `number` becomes the new ones. */
+static void drop_replaced(marcher *m, const bool *replaced, uint32_t *number) {
+    size_t kept = 0, triangles = 0;
+    for (size_t v = 0; v < m->vertices; ++v) {
+        if (replaced[v])
+            continue;
+        for (size_t k = 0; k < 3; ++k) {
+            if (m->origin)
+                m->offsets[3 * kept + k] = m->offsets[3 * v + k];
+            else
+                m->xyz[3 * kept + k] = m->xyz[3 * v + k];
+            m->normals[3 * kept + k] = m->normals[3 * v + k];
+        }
+        if (m->edge_of)
+            m->edge_of[kept] = m->edge_of[v];
+        number[v] = (uint32_t)kept++;
+    }
+    for (size_t t = 0; t < m->triangles; ++t) {
+        const uint32_t *const from = m->triangle + 3 * t;
+        if (replaced[from[0]])
+            continue;
+        for (size_t k = 0; k < 3; ++k)
+            m->triangle[3 * triangles + k] = number[from[k]];
+        ++triangles;
+    }
+    m->vertices = kept;
+    m->triangles = triangles;
+}
+
+static ovoid_status append_specks(ovoid_context *context, marcher *m, const ov_specks *specks) {
+    ovoid_status status = OVOID_OK;
+    const size_t total = m->vertices + specks->vertices, corners = 3 * m->triangles;
+    if (total > UINT32_MAX)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "the mesh has more than 2^32 vertices; use a larger spacing");
+    OV_TRY(grow_vertices(context, m, total));
+    OV_TRY(ov_grow(context, &m->triangle, &m->triangle_capacity, corners + 3 * specks->triangles,
+                   sizeof *m->triangle, "triangles"));
+    for (size_t k = 0; k < 3 * specks->vertices; ++k) {
+        put_coordinate(m, 3 * m->vertices + k, specks->xyz[k]);
+        m->normals[3 * m->vertices + k] = specks->normals[k];
+    }
+    if (m->edge_of)
+        memcpy(m->edge_of + m->vertices, specks->edge, specks->vertices);
+    for (size_t k = 0; k < 3 * specks->triangles; ++k)
+        m->triangle[corners + k] = (uint32_t)m->vertices + specks->corners[k];
+    m->vertices = total;
+    m->triangles += specks->triangles;
+cleanup:
+    return status;
+}
+
+static ovoid_status add_specks(ovoid_context *context, marcher *m, size_t count) {
+    ovoid_status status = OVOID_OK;
+    ov_specks specks = {0};
+    uint32_t *number = NULL;
+    bool *const replaced = ov_alloc(context, m->vertices, sizeof *replaced, "vertices");
+    const ov_lattice_mesh lattice = {.at = vertex_at,
+                                     .user = m,
+                                     .corners = m->triangle,
+                                     .vertices = m->vertices,
+                                     .triangles = m->triangles,
+                                     .replaced = replaced};
+    if (!replaced)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_specks_find(context, m->bodies, count, m->options,
+                          OV_MARCH_CUTOFF * m->options->isovalue, &lattice, &specks));
+    m->missed = specks.missed;
+    if (specks.vertices == 0)
+        goto cleanup;
+    number = ov_alloc(context, m->vertices, sizeof *number, "vertices");
+    if (!number) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    drop_replaced(m, replaced, number);
+    OV_TRY(append_specks(context, m, &specks));
+cleanup:
+    free(number);
+    free(replaced);
+    ov_specks_destroy(&specks);
     return status;
 }
 
@@ -566,10 +668,6 @@ cleanup:
 
 static bool vanishes(const float normal[3]) {
     return normal[0] == 0.0f && normal[1] == 0.0f && normal[2] == 0.0f;
-}
-
-static double coordinate(const marcher *m, size_t vertex, size_t axis) {
-    return m->origin ? (double)m->offsets[3 * vertex + axis] : m->xyz[3 * vertex + axis];
 }
 
 /* Twice a triangle's area times its normal. */
@@ -654,6 +752,7 @@ static void destroy_marcher(marcher *m) {
     release_work(m);
     free(m->xyz);
     free(m->offsets);
+    free(m->edge_of);
     free(m->normals);
     free(m->triangle);
 }
@@ -681,22 +780,68 @@ static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh)
     m->xyz = NULL;
     m->offsets = m->normals = NULL;
     m->triangle = NULL;
-    if (status == OVOID_OK)
-        (*mesh)->along_curve = true;
+    if (status != OVOID_OK)
+        return status;
+    (*mesh)->along_curve = true;
+    (*mesh)->spacing = m->options->spacing;
+    (*mesh)->missed = m->missed;
+    (*mesh)->edge = m->edge_of;
+    m->edge_of = NULL;
+    return OVOID_OK;
+}
+
+/* Where there are so many more pieces than ones with a surface, smaller pieces are tried; and what
+ * a piece costs beside its points, in points. */
+#define EMPTY_SHARE 8.0
+#define OVERHEAD 5e4
+static const uint64_t sparse_limits[][3] = {{64, 64, 32}, {32, 32, 16}, {16, 16, 8}};
+
+static double cost_of(const ov_pieces *pieces) {
+    return (double)pieces->pieces *
+           (OVERHEAD + (double)pieces->size[0] * (double)pieces->size[1] * (double)pieces->size[2]);
+}
+
+/* Cuts the lattice into pieces: small ones where terms are few and far apart. */
+static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
+                         const uint64_t limit[3]) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_mesh_options *const o = m->options;
+    const double cutoff = OV_MARCH_CUTOFF * o->isovalue;
+    ov_pieces *const best = &m->pieces;
+    OV_TRY(
+        ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit, best));
+    if ((double)best->count[0] * (double)best->count[1] * (double)best->count[2] <=
+        EMPTY_SHARE * (double)best->pieces)
+        goto cleanup;
+    for (size_t k = 0; k < sizeof sparse_limits / sizeof *sparse_limits; ++k) {
+        ov_pieces other;
+        OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing,
+                                sparse_limits[k], &other));
+        if (cost_of(&other) < cost_of(best)) {
+            const ov_pieces swap = *best;
+            *best = other;
+            other = swap;
+        }
+        ov_pieces_destroy(&other);
+    }
+cleanup:
     return status;
 }
 
 static ovoid_status march(ovoid_context *context, const ov_body *bodies, size_t count,
                           const ovoid_mesh_options *options, const uint64_t limit[3],
-                          const double *origin, const ov_watch *watch, ovoid_mesh **mesh) {
+                          const double *origin, const ov_watch *watch, bool specks,
+                          ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     marcher m = {.bodies = bodies, .options = options, .origin = origin, .watch = watch};
-    OV_TRY(ov_pieces_create(context, bodies, count, options->isovalue,
-                            OV_MARCH_CUTOFF * options->isovalue, options->spacing, limit,
-                            &m.pieces));
+    OV_TRY(plan(context, &m, count, limit));
     if (m.pieces.pieces > 0)
         OV_TRY(set_up(context, &m));
     OV_TRY(march_pieces(context, &m));
+    if (specks && m.pieces.pieces > 0)
+        OV_TRY(add_specks(context, &m, count));
+    if (m.vertices == 0)
+        OV_TRY(fail_empty(context, &m));
     OV_TRY(mend_normals(context, &m));
     release_work(&m); /* what is left is the mesh */
     OV_TRY(adopt(context, &m, mesh));
@@ -708,11 +853,37 @@ cleanup:
 ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
                       const ovoid_mesh_options *options, const uint64_t limit[3],
                       ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, NULL, NULL, mesh);
+    return march(context, bodies, count, options, limit, NULL, NULL, false, mesh);
 }
 
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
                             const double origin[3], const ov_watch *watch, ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, origin, watch, mesh);
+    return march(context, bodies, count, options, limit, origin, watch, false, mesh);
+}
+
+static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
+
+ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, ovoid_mesh **mesh) {
+    ovoid_mesh *made = NULL;
+    const ovoid_status status =
+        march(context, bodies, count, options, piece_limit, NULL, NULL, true, &made);
+    if (status != OVOID_OK)
+        return status;
+    if (made->missed > 0)
+        ov_warn(
+            context,
+            "%zu atom%s or ellipsoid%s make%s a surface too small or too thin for the spacing of "
+            "%g angstrom, which the mesh may lack; use a smaller one",
+            made->missed, made->missed == 1 ? "" : "s", made->missed == 1 ? "" : "s",
+            made->missed == 1 ? "s" : "", options->spacing);
+    *mesh = made;
+    return OVOID_OK;
+}
+
+ovoid_status ov_mesh_bodies_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                                  const ovoid_mesh_options *options, const double origin[3],
+                                  const ov_watch *watch, ovoid_mesh **mesh) {
+    return march(context, bodies, count, options, piece_limit, origin, watch, true, mesh);
 }

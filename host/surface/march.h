@@ -13,6 +13,9 @@
 #define OV_MARCH_PIECE                                                                             \
     { 128, 128, 64 }
 
+/* A vertex keeps this far from the ends of its edge, in lattice steps (see kernels/march.cl). */
+#define OV_EDGE_MARGIN 7.62939453125e-6
+
 /* Terms count where they are at least this share of the isovalue. */
 #define OV_MARCH_CUTOFF 1e-7
 
@@ -28,5 +31,12 @@ ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t coun
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
                             const double origin[3], const ov_watch *watch, ovoid_mesh **mesh);
+
+/* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). */
+ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, ovoid_mesh **mesh);
+ovoid_status ov_mesh_bodies_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                                  const ovoid_mesh_options *options, const double origin[3],
+                                  const ov_watch *watch, ovoid_mesh **mesh);
 
 #endif

@@ -359,6 +359,7 @@ void ovoid_mesh_destroy(ovoid_mesh **mesh) {
         return;
     free((*mesh)->xyz);
     free((*mesh)->offsets);
+    free((*mesh)->edge);
     free((*mesh)->normals);
     free((*mesh)->corners);
     free((*mesh)->component_of);

@@ -19,9 +19,16 @@ struct ovoid_mesh {
     uint32_t *component_of; /* vertices */
     ovoid_component *component;
     size_t components;
+    double spacing;   /* of the lattice on whose edges the vertices lie, angstrom; 0 if not known */
+    uint8_t *edge;    /* vertices, the edge of each: its axis, and shifted by OV_EDGE_AXIS_BITS how
+                         often the lattice was halved there; NULL if light, or not known */
+    size_t missed;    /* terms whose piece of the surface could not be meshed (specks.h) */
     bool along_curve; /* vertices and triangles follow a space-filling curve, none is without the
                          other */
 };
+
+#define OV_EDGE_AXIS_BITS 2
+#define OV_EDGE_AXES 3u /* mask */
 
 /* Asked between the parts of something long; false stops it with OVOID_ERROR_CANCELLED. {0} lets it
  * go on. */

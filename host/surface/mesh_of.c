@@ -10,8 +10,6 @@
 #define ISOVALUE_MIN 1e-25
 #define ISOVALUE_MAX 1e30
 
-static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
-
 void ovoid_mesh_options_init(ovoid_mesh_options *options) {
     if (options)
         *options = (ovoid_mesh_options){
@@ -53,7 +51,7 @@ ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *m
         return OVOID_ERROR_MEMORY;
     for (size_t i = 0; i < atoms; ++i)
         ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
-    OV_TRY(ov_march(context, bodies, atoms, options, piece_limit, mesh));
+    OV_TRY(ov_mesh_bodies(context, bodies, atoms, options, mesh));
 cleanup:
     free(bodies);
     return status;
@@ -91,7 +89,7 @@ ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
     if (model->count > 0)
         OV_TRY(
             check_ellipsoids(context, bodies, model->count, OV_MARCH_CUTOFF * options->isovalue));
-    OV_TRY(ov_march(context, bodies, model->count, options, piece_limit, mesh));
+    OV_TRY(ov_mesh_bodies(context, bodies, model->count, options, mesh));
 cleanup:
     free(bodies);
     return status;

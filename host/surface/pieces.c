@@ -1,6 +1,7 @@
 #include "surface/pieces.h"
 
 #include "field/bricks.h"
+#include "field/work.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,6 +11,7 @@ void ov_body_of_atom(const double xyzr[4], double decay, ov_body *body) {
     ov_quadric_of_atom(xyzr, decay, &body->quadric);
     for (int axis = 0; axis < 3; ++axis)
         body->extent[axis] = 1.0 / sqrt(decay);
+    body->least = 1.0 / sqrt(decay);
 }
 
 /* Half-sides sqrt((A^-1)_kk), from A's own axes: the inverse of a long needle's A is all rounding.
@@ -24,11 +26,17 @@ void ov_body_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_body *body) {
             sum += r[p][axis] * r[p][axis] / ellipsoid->decay[p];
         body->extent[axis] = sqrt(sum);
     }
+    body->least =
+        1.0 / sqrt(fmax(fmax(ellipsoid->decay[0], ellipsoid->decay[1]), ellipsoid->decay[2]));
+}
+
+double ov_body_reach(const ov_body *body, double value) {
+    const double q = log(body->quadric.amplitude / value);
+    return q > 0.0 ? sqrt(q) : -1.0;
 }
 
 /* What a lattice index may be; differences and doubles stay exact far beyond. */
 #define INDEX_LIMIT 1e12
-#define POINTS_LIMIT 1e13 /* evaluated: days of work */
 
 static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
@@ -44,12 +52,6 @@ typedef struct planner {
     size_t pairs;
 } planner;
 
-/* How far a term reaches the value, as a multiple of its extent; negative where it nowhere does. */
-static double reach_of(const ov_body *body, double value) {
-    const double q = log(body->quadric.amplitude / value);
-    return q > 0.0 ? sqrt(q) : -1.0;
-}
-
 static ovoid_status fail_large(ovoid_context *context, double spacing) {
     return ov_fail(context, OVOID_ERROR_LIMIT,
                    "the lattice about the surface is too large for a spacing of %g angstrom; use a "
@@ -62,7 +64,7 @@ static bool bounds(const planner *p, double low[3], double high[3]) {
     bool any = false;
     for (size_t i = 0; i < p->count; ++i) {
         const ov_body *const body = &p->bodies[i];
-        const double reach = reach_of(body, p->threshold);
+        const double reach = ov_body_reach(body, p->threshold);
         if (reach < 0.0)
             continue;
         for (int axis = 0; axis < 3; ++axis) {
@@ -113,7 +115,7 @@ static void piece_range(const ov_pieces *pieces, int axis, double centre, double
 
 static void term_range(const planner *p, const ov_body *body, double value, uint64_t first[3],
                        uint64_t end[3]) {
-    const double reach = reach_of(body, value);
+    const double reach = ov_body_reach(body, value);
     for (int axis = 0; axis < 3; ++axis) {
         first[axis] = end[axis] = 0;
         if (reach >= 0.0)
@@ -129,13 +131,17 @@ static bool in_range(const uint64_t at[3], const uint64_t first[3], const uint64
     return true;
 }
 
-static double count_pairs(const planner *p) {
+/* Pairs of a piece and a term that reaches the value in it; *most: of one term. */
+static double count_pairs(const planner *p, double value, double *most) {
     double pairs = 0.0;
     uint64_t first[3], end[3];
+    *most = 0.0;
     for (size_t i = 0; i < p->count; ++i) {
-        term_range(p, &p->bodies[i], p->cutoff, first, end);
-        pairs +=
+        term_range(p, &p->bodies[i], value, first, end);
+        const double own =
             (double)(end[0] - first[0]) * (double)(end[1] - first[1]) * (double)(end[2] - first[2]);
+        pairs += own;
+        *most = fmax(*most, own);
     }
     return pairs;
 }
@@ -173,9 +179,53 @@ static void keep_pieces(planner *p) {
     pieces->start[pieces->pieces] = kept;
 }
 
+/* Values of terms at lattice points, about: in its ellipsoid {q <= s^2} a term counts. */
+static double count_values(const planner *p) {
+    const double cell = pow(p->pieces->spacing, 3);
+    double values = 0.0;
+    for (size_t i = 0; i < p->count; ++i) {
+        const double *const a = p->bodies[i].quadric.a;
+        const double reach = fmax(0.0, ov_body_reach(&p->bodies[i], p->cutoff));
+        const double determinant = a[0] * (a[3] * a[5] - a[4] * a[4]) -
+                                   a[1] * (a[1] * a[5] - a[4] * a[2]) +
+                                   a[2] * (a[1] * a[4] - a[3] * a[2]);
+        if (determinant > 0.0)
+            values += 4.19 * pow(reach, 3) / (sqrt(determinant) * cell);
+    }
+    return values;
+}
+
+/* Refuses what is too much: so many pieces at least and at most. */
+static ovoid_status check_work(ovoid_context *context, const planner *p, double least,
+                               double most) {
+    const uint64_t *const size = p->pieces->size;
+    const double points = (double)size[0] * (double)size[1] * (double)size[2];
+    const ov_work work = {.points_least = least * points,
+                          .points_most = most * points,
+                          .values = count_values(p),
+                          .terms = p->count,
+                          .spacing = p->pieces->spacing,
+                          .what = "the surface"};
+    return ov_work_check(context, &work);
+}
+
+/* Before pieces are told apart: at least those of one term, and at most all of the box or all that
+ * terms reach. */
+static ovoid_status check_bounds(ovoid_context *context, const planner *p) {
+    const uint64_t *const count = p->pieces->count;
+    double most;
+    const double box = (double)count[0] * (double)count[1] * (double)count[2],
+                 pairs = count_pairs(p, p->threshold, &most);
+    return check_work(context, p, most, fmin(box, pairs));
+}
+
 static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
     ov_pieces *const pieces = p->pieces;
-    const double pairs = count_pairs(p);
+    double most;
+    const ovoid_status bound = check_bounds(context, p);
+    if (bound != OVOID_OK)
+        return bound;
+    const double pairs = count_pairs(p, p->cutoff, &most);
     if (!(pairs < (double)UINT32_MAX))
         return fail_large(context, pieces->spacing);
     const size_t room = (size_t)pairs;
@@ -199,9 +249,7 @@ static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
     if (!pieces->key || !pieces->start || !pieces->term)
         return OVOID_ERROR_MEMORY;
     keep_pieces(p);
-    const double points = (double)pieces->pieces * (double)pieces->size[0] *
-                          (double)pieces->size[1] * (double)pieces->size[2];
-    return points < POINTS_LIMIT ? OVOID_OK : fail_large(context, pieces->spacing);
+    return check_work(context, p, (double)pieces->pieces, (double)pieces->pieces);
 }
 
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,

@@ -8,14 +8,19 @@
 #include "base/base.h"
 #include "field/ellipsoid.h"
 
-/* A term of a field, and how far it reaches: {q <= s^2} fits in a box of half-sides s * extent. */
+/* A term of a field, and how far it reaches: {q <= s^2} fits in a box of half-sides s * extent, and
+ * a ball of radius s * least fits in it. */
 typedef struct ov_body {
     ov_quadric quadric;
     double extent[3]; /* angstrom */
+    double least;     /* angstrom */
 } ov_body;
 
 void ov_body_of_atom(const double xyzr[4], double decay, ov_body *body);
 void ov_body_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_body *body);
+
+/* The s up to which a term is at least `value`; negative where it nowhere is. */
+double ov_body_reach(const ov_body *body, double value);
 
 /* A piece holds size[0] x size[1] x size[2] points of the lattice of multiples of `spacing`. */
 typedef struct ov_pieces {

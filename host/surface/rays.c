@@ -11,6 +11,7 @@ _Static_assert(OV_BLOCK_X *OV_BLOCK_Y == OV_PACK, "a block is a pack");
 #define TILE 32                        /* rays on a side of the smallest tile */
 #define BOXES_MOST ((uint64_t)1 << 20) /* before tiles grow */
 #define SLABS_MOST ((uint64_t)1 << 21) /* altogether */
+#define VISITS_MOST 1e11               /* of slabs by packs of rays: a minute on two cores */
 #define CURVE_BITS 21                  /* tiles and slabs are fewer than 2^21 each way */
 #define STEP_LEAST 0.05                /* angstrom */
 #define STEP_MOST 0.4                  /* angstrom */
@@ -152,6 +153,12 @@ ovoid_status ov_boxes_create(ovoid_context *context, const ov_quadric *quadrics,
         return ov_fail(context, OVOID_ERROR_LIMIT,
                        "%g angstrom along the line of sight are too deep for a picture",
                        boxes->front - low);
+    if (slabs * (double)ov_rays_packs(rays) > VISITS_MOST)
+        return ov_fail(
+            context, OVOID_ERROR_LIMIT,
+            "%g angstrom along the line of sight are too deep for a picture of so many pixels; "
+            "take a smaller one, or look from where it is less deep",
+            boxes->front - low);
     boxes->slabs = slabs < 1.0 ? 1 : (uint32_t)slabs;
     plan_tiles(rays, boxes);
     OV_TRY(make_cells(context, rays, boxes));

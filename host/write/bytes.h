@@ -44,6 +44,13 @@ static inline void ov_put_f32(ov_bytes *bytes, float value) {
     ov_put_u32(bytes, bits);
 }
 
+static inline void ov_put_f64(ov_bytes *bytes, double value) {
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    ov_put_u32(bytes, (uint32_t)(bits & UINT32_MAX));
+    ov_put_u32(bytes, (uint32_t)(bits >> 32));
+}
+
 static inline void ov_put_text(ov_bytes *bytes, const char *text, size_t length) {
     for (size_t i = 0; i < length; i++)
         ov_put_u8(bytes, (unsigned char)text[i]);

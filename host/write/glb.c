@@ -3,7 +3,10 @@
  * multiples of four bytes long.
  *
  * glTF's unit is the metre. A molecule in metres is lost to every viewer, so one unit here is one
- * angstrom, as other programs for molecules have it, and asset.extras says so. */
+ * angstrom, as other programs for molecules have it, and asset.extras says so.
+ *
+ * Positions are floats. Far from the origin, where these are coarse, they are relative to the
+ * middle of the mesh, and the node moves them there. */
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -18,30 +21,37 @@ typedef struct layout {
     uint64_t vectors; /* bytes of the positions, and of the normals */
     uint64_t indices; /* bytes */
     float low[3], high[3];
+    double origin[3]; /* of the positions, angstrom */
 } layout;
 
 static void find_layout(const ovoid_mesh *mesh, layout *l) {
-    const double *xyz = ovoid_mesh_xyz(mesh);
     *l = (layout){.vertices = ovoid_mesh_vertices(mesh), .triangles = ovoid_mesh_triangles(mesh)};
     l->vectors = (uint64_t)l->vertices * VECTOR;
     l->indices = (uint64_t)l->triangles * VECTOR;
-    for (size_t axis = 0; axis < 3; axis++) {
-        l->low[axis] = l->high[axis] = (float)xyz[axis];
-        for (size_t i = 1; i < l->vertices; i++) {
-            l->low[axis] = fminf(l->low[axis], (float)xyz[3 * i + axis]);
-            l->high[axis] = fmaxf(l->high[axis], (float)xyz[3 * i + axis]);
+    if (!ov_mesh_floats_are_fine(mesh, l->origin))
+        ov_mesh_middle(mesh, l->origin);
+    for (size_t i = 0; i < l->vertices; i++) {
+        float at[3];
+        ov_mesh_float_at(mesh, i, l->origin, at);
+        for (size_t axis = 0; axis < 3; axis++) {
+            l->low[axis] = i == 0 ? at[axis] : fminf(l->low[axis], at[axis]);
+            l->high[axis] = i == 0 ? at[axis] : fmaxf(l->high[axis], at[axis]);
         }
     }
 }
 
 /* The JSON chunk, filled up with blanks to a multiple of four. Nine digits keep a float. */
 static uint32_t print_json(const layout *l, char *text) {
+    char moved[128] = "";
+    if (l->origin[0] != 0.0 || l->origin[1] != 0.0 || l->origin[2] != 0.0)
+        snprintf(moved, sizeof moved, ",\"translation\":[%.9g,%.9g,%.9g]", l->origin[0],
+                 l->origin[1], l->origin[2]);
     int length = snprintf(
         text, TEXT,
         "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Ovoid %s\","
         "\"extras\":{\"unit\":\"angstrom\"}},"
         "\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
-        "\"nodes\":[{\"mesh\":0,\"name\":\"surface\"}],"
+        "\"nodes\":[{\"mesh\":0,\"name\":\"surface\"%s}],"
         "\"meshes\":[{\"name\":\"surface\",\"primitives\":[{\"attributes\":{\"POSITION\":0,"
         "\"NORMAL\":1},\"indices\":2,\"material\":0,\"mode\":4}]}],"
         "\"materials\":[{\"name\":\"surface\",\"pbrMetallicRoughness\":{\"baseColorFactor\":"
@@ -55,7 +65,7 @@ static uint32_t print_json(const layout *l, char *text) {
         "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]},"
         "{\"bufferView\":1,\"componentType\":5126,\"count\":%zu,\"type\":\"VEC3\"},"
         "{\"bufferView\":2,\"componentType\":5125,\"count\":%zu,\"type\":\"SCALAR\"}]}",
-        ovoid_version(), 2 * l->vectors + l->indices, l->vectors, l->vectors, l->vectors,
+        ovoid_version(), moved, 2 * l->vectors + l->indices, l->vectors, l->vectors, l->vectors,
         2 * l->vectors, l->indices, l->vertices, (double)l->low[0], (double)l->low[1],
         (double)l->low[2], (double)l->high[0], (double)l->high[1], (double)l->high[2], l->vertices,
         3 * l->triangles);
@@ -74,11 +84,14 @@ static void put_normal(ov_bytes *bytes, const float *normal) {
 }
 
 static void put_buffer(ov_bytes *bytes, const ovoid_mesh *mesh, const layout *l) {
-    const double *xyz = ovoid_mesh_xyz(mesh);
     const float *normals = ovoid_mesh_normals(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
-    for (size_t i = 0; i < 3 * l->vertices; i++)
-        ov_put_f32(bytes, (float)xyz[i]);
+    for (size_t i = 0; i < l->vertices; i++) {
+        float at[3];
+        ov_mesh_float_at(mesh, i, l->origin, at);
+        for (size_t axis = 0; axis < 3; axis++)
+            ov_put_f32(bytes, at[axis]);
+    }
     for (size_t i = 0; i < l->vertices; i++)
         put_normal(bytes, normals + 3 * i);
     for (size_t i = 0; i < 3 * l->triangles; i++)
@@ -90,6 +103,11 @@ ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     char json[TEXT];
     ov_bytes bytes = {.stream = stream};
     find_layout(mesh, &l);
+    if (!ov_mesh_floats_suffice(mesh, l.origin))
+        return ov_fail(
+            context, OVOID_ERROR_LIMIT,
+            "glTF has single precision alone, which is too coarse for a mesh that is so large "
+            "and so fine: write .ply");
     const uint32_t json_length = print_json(&l, json);
     const uint64_t buffer = 2 * l.vectors + l.indices;
     const uint64_t total = HEADER + 2 * CHUNK_HEADER + json_length + buffer;

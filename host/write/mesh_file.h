@@ -1,8 +1,10 @@
 /*
  * The formats of meshes, one file each. Every function writes the whole mesh to a stream, in the
  * order of its vertices and triangles, so that equal meshes give equal bytes. Coordinates are those
- * of the molecule's file, in angstrom, as floats (24 bits: 1e-5 angstrom at 100 angstrom from the
- * origin). A failed write shows in the stream's error flag.
+ * of the molecule's file, in angstrom. A failed write shows in the stream's error flag.
+ *
+ * However a format rounds them, no two vertices become one and no triangle loses its area: programs
+ * that merge equal vertices find a closed mesh.
  *
  * The mesh has at least one triangle. The thread's locale is "C".
  */
@@ -13,6 +15,25 @@
 #include "ovoid/surface.h"
 
 #include <stdio.h>
+
+/* ---- single precision ----------------------------------------------------------------------- */
+
+/* A vertex as floats relative to an origin, moved by no more than a float's step so as to stay
+ * within its edge of the lattice. For meshes whose floats suffice. */
+void ov_mesh_float_at(const ovoid_mesh *mesh, size_t vertex, const double origin[3], float at[3]);
+
+/* Whether floats relative to an origin are much finer than the mesh, or fine enough at least to
+ * keep vertices apart. */
+bool ov_mesh_floats_are_fine(const ovoid_mesh *mesh, const double origin[3]);
+bool ov_mesh_floats_suffice(const ovoid_mesh *mesh, const double origin[3]);
+
+/* An origin in the middle of the mesh, in whole angstrom. */
+void ov_mesh_middle(const ovoid_mesh *mesh, double middle[3]);
+
+/* Significant digits of text that keep vertices apart. */
+int ov_mesh_digits(const ovoid_mesh *mesh);
+
+/* ---- formats ------------------------------------------------------------------------------ */
 
 ovoid_status ov_write_ply(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream);
 ovoid_status ov_write_obj(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream);

@@ -10,10 +10,12 @@ ovoid_status ov_write_obj(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     const double *xyz = ovoid_mesh_xyz(mesh);
     const float *normals = ovoid_mesh_normals(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
+    const int digits = ov_mesh_digits(mesh);
     fprintf(stream, "# Ovoid %s, lengths in angstrom: %zu vertices, %zu triangles\n",
             ovoid_version(), vertices, triangles);
     for (size_t i = 0; i < vertices && !ferror(stream); i++)
-        fprintf(stream, "v %.7g %.7g %.7g\n", xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]);
+        fprintf(stream, "v %.*g %.*g %.*g\n", digits, xyz[3 * i], digits, xyz[3 * i + 1], digits,
+                xyz[3 * i + 2]);
     for (size_t i = 0; i < vertices && !ferror(stream); i++)
         fprintf(stream, "vn %.5g %.5g %.5g\n", (double)normals[3 * i], (double)normals[3 * i + 1],
                 (double)normals[3 * i + 2]);

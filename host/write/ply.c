@@ -9,27 +9,41 @@ static const char *index_type(size_t vertices) {
     return vertices <= INT32_MAX ? "int" : "uint";
 }
 
+static const double zero[3] = {0.0, 0.0, 0.0};
+
+static void put_place(ov_bytes *bytes, const ovoid_mesh *mesh, size_t vertex, bool floats) {
+    const double *xyz = ovoid_mesh_xyz(mesh) + 3 * vertex;
+    float at[3];
+    ov_mesh_float_at(mesh, vertex, zero, at);
+    for (size_t axis = 0; axis < 3; axis++)
+        if (floats)
+            ov_put_f32(bytes, at[axis]);
+        else
+            ov_put_f64(bytes, xyz[axis]);
+}
+
+/* Coordinates are floats, as readers expect, or where these are too coarse doubles. */
 ovoid_status ov_write_ply(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream) {
     (void)context;
     const size_t vertices = ovoid_mesh_vertices(mesh), triangles = ovoid_mesh_triangles(mesh);
-    const double *xyz = ovoid_mesh_xyz(mesh);
     const float *normals = ovoid_mesh_normals(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
+    const bool floats = ov_mesh_floats_are_fine(mesh, zero);
+    const char *const type = floats ? "float" : "double";
     ov_bytes bytes = {.stream = stream};
     fprintf(stream,
             "ply\n"
             "format binary_little_endian 1.0\n"
             "comment Ovoid %s, lengths in angstrom\n"
             "element vertex %zu\n"
-            "property float x\nproperty float y\nproperty float z\n"
+            "property %s x\nproperty %s y\nproperty %s z\n"
             "property float nx\nproperty float ny\nproperty float nz\n"
             "element face %zu\n"
             "property list uchar %s vertex_indices\n"
             "end_header\n",
-            ovoid_version(), vertices, triangles, index_type(vertices));
+            ovoid_version(), vertices, type, type, type, triangles, index_type(vertices));
     for (size_t i = 0; i < vertices; i++) {
-        for (size_t axis = 0; axis < 3; axis++)
-            ov_put_f32(&bytes, (float)xyz[3 * i + axis]);
+        put_place(&bytes, mesh, i, floats);
         for (size_t axis = 0; axis < 3; axis++)
             ov_put_f32(&bytes, normals[3 * i + axis]);
     }

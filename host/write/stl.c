@@ -27,11 +27,17 @@ ovoid_status ov_write_stl(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     const double *xyz = ovoid_mesh_xyz(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
     ov_bytes bytes = {.stream = stream};
+    static const double zero[3] = {0.0, 0.0, 0.0};
     char header[HEADER + 1] = "";
     if (triangles > UINT32_MAX)
         return ov_fail(context, OVOID_ERROR_LIMIT,
                        "STL holds 2^32 - 1 triangles at most, the mesh has %zu: write .ply",
                        triangles);
+    if (!ov_mesh_floats_suffice(mesh, zero))
+        return ov_fail(
+            context, OVOID_ERROR_LIMIT,
+            "STL has single precision alone, which so far from the origin is too coarse for "
+            "this mesh: write .ply, or move the molecule");
     /* Must not begin with "solid", the mark of the text form. */
     snprintf(header, sizeof header, "Ovoid %s, lengths in angstrom", ovoid_version());
     ov_put_text(&bytes, header, HEADER);
@@ -44,9 +50,12 @@ ovoid_status ov_write_stl(ovoid_context *context, const ovoid_mesh *mesh, FILE *
         triangle_normal(at[0], at[1], at[2], normal);
         for (size_t axis = 0; axis < 3; axis++)
             ov_put_f32(&bytes, (float)normal[axis]);
-        for (size_t corner = 0; corner < 3; corner++)
+        for (size_t corner = 0; corner < 3; corner++) {
+            float place[3];
+            ov_mesh_float_at(mesh, corners[3 * i + corner], zero, place);
             for (size_t axis = 0; axis < 3; axis++)
-                ov_put_f32(&bytes, (float)at[corner][axis]);
+                ov_put_f32(&bytes, place[axis]);
+        }
         ov_put_u16(&bytes, 0);
     }
     ov_bytes_flush(&bytes);

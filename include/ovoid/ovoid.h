@@ -579,6 +579,19 @@ typedef struct ovoid_fit_profile {
     uint64_t launches; /* kernels enqueued */
 } ovoid_fit_profile;
 
+/* Whether the goal of method adaptive was reached, and if not, why. */
+typedef enum ovoid_verdict {
+    OVOID_VERDICT_REACHED = 0,
+    OVOID_VERDICT_MISSED, /* measured, and further apart than asked; or not so many ellipsoids */
+    OVOID_VERDICT_NO_SURFACE, /* there is none to be near to: the molecule's field is nowhere above
+                                 the isovalue at the lattice points. The model follows the field
+                                 then */
+    OVOID_VERDICT_NO_MODEL_SURFACE, /* the model has none */
+    OVOID_VERDICT_COARSE /* mesh_spacing is above both the tolerance and 2 / sqrt(2 decay), or
+                            parts of the surface are too small for it: nothing that was measured
+                            would tell */
+} ovoid_verdict;
+
 typedef struct ovoid_fit_result {
     double spacing;  /* of the constrained points, angstrom: what was asked for or the default */
     uint64_t points; /* constrained points */
@@ -586,10 +599,12 @@ typedef struct ovoid_fit_result {
     uint64_t iterations; /* done */
     double rms_error;    /* of l1: sqrt(E_s / points); of adaptive 0 */
     double max_error;    /* of l1: max_k |phi~ - phi| over the constrained points; of adaptive 0 */
-    bool reached;        /* the goal; always true of l1, and of adaptive where the molecule's field
-                            nowhere reaches the isovalue: the model follows the field then */
-    double distance;     /* largest between the outer surfaces, measured, angstrom; NAN where it was
-                            not measured (l1, or no surface) */
+    bool reached; /* the goal, as measured: verdict is OVOID_VERDICT_REACHED. Always true of l1,
+                     which has no goal */
+    ovoid_verdict verdict;
+    double distance; /* largest between the outer surfaces, measured, angstrom: right to 1e-7 of the
+                        molecule's half extent; NAN where it was not measured (l1, no surface, or
+                        too coarse a mesh) */
     uint64_t solver_iterations; /* of conjugate gradients (adaptive) */
     double sample_seconds;
     double fit_seconds;

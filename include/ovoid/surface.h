@@ -17,7 +17,7 @@ extern "C" {
 /* ---- meshes ------------------------------------------------------------------------------- */
 
 /* A closed triangle mesh of a surface phi = c: vertices shared, triangles counter-clockwise seen
- * from outside (where phi < c). */
+ * from outside (where phi <= c). No two vertices are equal, no triangle is without area. */
 typedef struct ovoid_mesh ovoid_mesh;
 
 /* Where the vertices lie on the edges of the lattice. */
@@ -37,8 +37,12 @@ typedef struct ovoid_mesh_options {
 OVOID_API void ovoid_mesh_options_init(ovoid_mesh_options *options);
 
 /* Marching cubes on the device over the lattice of multiples of `spacing` that covers the surface;
- * the lattice grows until the surface is closed inside it. Memory follows the surface, not the box.
- * OVOID_ERROR_EMPTY when the field nowhere reaches the isovalue on the lattice. */
+ * the lattice grows until the surface is closed inside it. Pieces of the surface that are small to
+ * the lattice, of single atoms and ellipsoids above all, are meshed on finer lattices, each the
+ * last one halved; a warning counts what is smaller than a thousandth of the spacing. Time and
+ * memory follow the surface, not the box. OVOID_ERROR_EMPTY when the field is nowhere above the
+ * isovalue on the lattice, OVOID_ERROR_LIMIT when that would have more than 2e10 points and 1e5
+ * for each atom or ellipsoid, or more than 1e12 values of Gaussians at them and 1e6 for each. */
 OVOID_API ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *molecule,
                                            double decay, const ovoid_mesh_options *options,
                                            ovoid_mesh **mesh);

@@ -63,3 +63,25 @@ if [ -w /dev/full ]; then
     run "$OVOID" fit a.xyzr --tolerance 0.3 --steps 0 --report /dev/full
     expect_code 4
 fi
+
+# Where nothing was measured, nothing was reached: without a surface, or with too coarse a mesh.
+rm -f ./*
+printf '0 0 0 0\n' >zero.xyzr
+run "$OVOID" fit zero.xyzr -o a.ovoid --report r.json
+expect_code 7
+expect_err "ovoid: warning: the goal was not reached: there is no surface to be near to: the molecule's"
+expect_out "goal      outer surfaces within 0.5 Å: not reached: there is no surface to be near to"
+grep -q '"reached":	false' r.json || fail "the report should say that it was not reached"
+grep -q '"reason":	"there is no surface to be near to' r.json || fail "and why"
+grep -q '^# goal: not reached$' a.ovoid || fail "and so should the model"
+make_chain 20 a.xyzr
+for name in a.xyzr zero.xyzr; do
+    run "$OVOID" fit $name -o a.ovoid --report r.json --mesh-spacing 100
+    expect_code 7
+    expect_err "ovoid: warning: the goal was not reached: a mesh spacing of 100 Å is too coarse to tell whether"
+    expect_out "not reached: a mesh spacing of 100 Å is too coarse"
+    grep -q '"reason":	"a mesh spacing of 100 Å is too coarse' r.json || fail "the report should say why"
+done
+run "$OVOID" fit zero.xyzr -o a.ovoid --ellipsoids 1 --report r.json
+expect_code 0
+grep -q '"reached":	true' r.json || fail "one ellipsoid is what was asked"

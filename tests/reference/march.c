@@ -30,7 +30,7 @@ static size_t stride(const reference_mesh *mesh, unsigned axis) {
 
 static void add_vertex(reference_mesh *mesh, size_t point, unsigned axis, double isovalue) {
     const double a = mesh->phi[point], b = mesh->phi[point + stride(mesh, axis)];
-    if ((a >= isovalue) == (b >= isovalue))
+    if ((a > isovalue) == (b > isovalue))
         return;
     const size_t v = mesh->vertices++;
     mesh->vertex[3 * point + axis] = (uint32_t)v;
@@ -46,7 +46,7 @@ static void add_cell(reference_mesh *mesh, const ov_case_table *table, size_t po
     for (unsigned k = 0; k < 8; ++k) {
         corner[k] = point + (k & 1) * stride(mesh, 0) + (k >> 1 & 1) * stride(mesh, 1) +
                     (k >> 2) * stride(mesh, 2);
-        index |= (unsigned)(mesh->phi[corner[k]] >= isovalue) << k;
+        index |= (unsigned)(mesh->phi[corner[k]] > isovalue) << k;
     }
     const uint8_t *const entry = table->entry[index];
     for (unsigned k = 1; k <= 3u * entry[0]; ++k)

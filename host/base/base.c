@@ -75,6 +75,34 @@ void ovoid_free(void *memory) {
     free(memory);
 }
 
+/* Length of the UTF-8 character that text begins with; 0 where it is none, or a control character
+ * other than a line's end: logs of compilers have several lines. */
+static size_t character(const unsigned char *text) {
+    const unsigned char c = text[0];
+    const size_t length = c < 0x80   ? 1
+                          : c < 0xc2 ? 0
+                          : c < 0xe0 ? 2
+                          : c < 0xf0 ? 3
+                          : c < 0xf5 ? 4
+                                     : 0;
+    for (size_t i = 1; i < length; i++)
+        if ((text[i] & 0xc0) != 0x80)
+            return 0;
+    const bool control = (c < 0x20 && c != '\n') || c == 0x7f || (c == 0xc2 && text[1] < 0xa0);
+    return control ? 0 : length;
+}
+
+/* Messages quote what files and callers hold, and may be shown on a terminal, which control
+ * characters play with: what is no text becomes '?'. */
+static void make_printable(char *text) {
+    for (unsigned char *c = (unsigned char *)text; *c;) {
+        const size_t length = character(c);
+        if (!length)
+            *c = *c == '\t' ? ' ' : '?';
+        c += length ? length : 1;
+    }
+}
+
 static char *format_text(const char *format, va_list args) {
     va_list again;
     va_copy(again, args);
@@ -83,8 +111,10 @@ static char *format_text(const char *format, va_list args) {
     if (length < 0)
         return NULL;
     char *text = malloc((size_t)length + 1);
-    if (text)
-        vsnprintf(text, (size_t)length + 1, format, args);
+    if (!text)
+        return NULL;
+    vsnprintf(text, (size_t)length + 1, format, args);
+    make_printable(text);
     return text;
 }
 

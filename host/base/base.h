@@ -20,8 +20,9 @@ struct ovoid_context {
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */
 };
 
-/* Records the failure text (printf style) and returns status. context may be NULL. If even the text
- * cannot be stored, a fixed text stands in for it. */
+/* Records the failure text (printf style) and returns status. Bytes of it that are no UTF-8, and
+ * control characters but for ends of lines, become '?'; the same holds for warnings.
+ * context may be NULL. If even the text cannot be stored, a fixed text stands in for it. */
 #if defined(__GNUC__)
 __attribute__((format(printf, 3, 4)))
 #endif

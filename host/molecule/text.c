@@ -308,6 +308,12 @@ ovoid_status ov_text_fail(ov_text *text, const ov_line *line, const char *at, co
                    (unsigned long long)line->number, (size_t)(at - line->text) + 1, reason);
 }
 
+ovoid_status ov_text_limit(ovoid_context *context, const ov_text *text, uint64_t line, size_t most,
+                           const char *what) {
+    return ov_fail(context, OVOID_ERROR_LIMIT, "%s:%llu:1: more than %zu %s", text->name,
+                   (unsigned long long)line, most, what);
+}
+
 const char *ov_quote_text(ov_quote *quote, const char *text, size_t length) {
     const size_t most = 40;
     char *out = quote->text;

@@ -45,6 +45,11 @@ __attribute__((format(printf, 4, 5)))
 ovoid_status
 ov_text_fail(ov_text *text, const ov_line *line, const char *at, const char *format, ...);
 
+/* Records OVOID_ERROR_LIMIT as "name:line:1: more than `most` `what`", of something that no
+ * molecule's file has so many of: memory is not to follow such a file. */
+ovoid_status ov_text_limit(ovoid_context *context, const ov_text *text, uint64_t line, size_t most,
+                           const char *what);
+
 /* Room for a piece of a file in quotes in a message. */
 typedef struct ov_quote {
     char text[176];

@@ -186,6 +186,36 @@ static void parts_share_the_limit_of_placements(void **state) {
                    "assembly 1 has more than 1000000 placements");
 }
 
+/* Of several entities with one id the first counts, however many there are and in whatever order.
+ */
+static void entities_are_found_among_many(void **state) {
+    (void)state;
+    enum { OTHERS = 3000 };
+    static char text[OTHERS * 20 + 1024];
+    size_t used = (size_t)sprintf(text, "loop_\n_entity.id\n_entity.type\n7x polymer\n7x water\n");
+    for (int i = OTHERS; i > 0; i--)
+        used += (size_t)sprintf(text + used, "%d %s\n", i, i == 5 ? "polymer" : "other");
+    sprintf(text + used, "%s",
+            "loop_\n_atom_site.label_entity_id\n_atom_site.Cartn_x\n_atom_site.Cartn_y\n"
+            "_atom_site.Cartn_z\n_atom_site.label_seq_id\n"
+            "7x 1 0 0 1\n4 2 0 0 2\n5 3 0 0 3\n9999 4 0 0 4\n7x 5 0 0 5\n");
+    char path[128];
+    ovoid_molecule *molecule = NULL;
+    ovoid_read_options options;
+    ovoid_read_options_init(&options, sizeof options);
+    options.select = ";polymer";
+    snprintf(path, sizeof path, "%s/a.cif", folder);
+    write_text(path, text, strlen(text));
+    assert_int_equal(ovoid_molecule_read_with(context, path, &options, &molecule), OVOID_OK);
+    remove(path);
+    const double *xyzr = ovoid_molecule_xyzr(molecule);
+    static const double expected[] = {1, 3, 4, 5}; /* what has no entity is taken by its name */
+    assert_int_equal(ovoid_molecule_atoms(molecule), 4);
+    for (int i = 0; i < 4; i++)
+        assert_true(xyzr[4 * i] == expected[i]);
+    ovoid_molecule_destroy(&molecule);
+}
+
 /* ---- memory --------------------------------------------------------------------------------- */
 
 typedef enum kind { MOLECULE, RADII, MODEL } kind;
@@ -368,6 +398,7 @@ int main(void) {
         cmocka_unit_test(rows_may_be_empty),
         cmocka_unit_test(chains_do_not_part_an_operator),
         cmocka_unit_test(long_ranges_cost_nothing),
+        cmocka_unit_test(entities_are_found_among_many),
         cmocka_unit_test(parts_share_the_limit_of_placements),
         cmocka_unit_test(memory_follows_atoms_alone),
         cmocka_unit_test(gzip_is_unpacked_in_pieces),

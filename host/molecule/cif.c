@@ -146,6 +146,7 @@ enum { CATEGORIES = sizeof categories / sizeof categories[0], NONE = -1, IGNORED
 typedef struct ov_entity_type {
     char id[12];
     ov_entity entity;
+    size_t order; /* in the file: of several with the same id the first counts */
 } ov_entity_type;
 
 /* A value of the current row. */
@@ -180,6 +181,7 @@ struct ov_cif {
 
     ov_entity_type *entities;
     size_t entity_count, entity_room;
+    bool entities_sorted;
 };
 
 void ov_cif_destroy(ov_cif **cif) {
@@ -277,15 +279,32 @@ static void read_number(const ov_cif *cif, ov_site *site) {
     }
 }
 
-static ov_entity entity_of(const ov_cif *cif) {
-    char id[12];
-    if (!given(cif, ENTITY))
+static int by_id(const void *a, const void *b) {
+    const ov_entity_type *x = a, *y = b;
+    const int ids = memcmp(x->id, y->id, sizeof x->id);
+    return ids ? ids : (x->order > y->order) - (x->order < y->order);
+}
+
+static ov_entity entity_of(ov_cif *cif) {
+    ov_entity_type wanted = {.order = 0};
+    if (!given(cif, ENTITY) || !cif->entity_count)
         return OV_ENTITY_UNKNOWN;
-    ov_site_text(id, sizeof id, text_of(cif, ENTITY), cif->row[ENTITY].length);
-    for (size_t i = 0; i < cif->entity_count; i++)
-        if (memcmp(cif->entities[i].id, id, sizeof id) == 0)
-            return cif->entities[i].entity;
-    return OV_ENTITY_UNKNOWN;
+    ov_site_text(wanted.id, sizeof wanted.id, text_of(cif, ENTITY), cif->row[ENTITY].length);
+    if (!cif->entities_sorted)
+        qsort(cif->entities, cif->entity_count, sizeof wanted, by_id);
+    cif->entities_sorted = true;
+    size_t low = 0, high = cif->entity_count; /* the first that is not before the wanted one */
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (by_id(&cif->entities[middle], &wanted) < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    const ov_entity_type *found = &cif->entities[low];
+    return low < cif->entity_count && memcmp(found->id, wanted.id, sizeof wanted.id) == 0
+               ? found->entity
+               : OV_ENTITY_UNKNOWN;
 }
 
 static void read_element(ov_reader *reader, ov_site *site) {
@@ -296,7 +315,7 @@ static void read_element(ov_reader *reader, ov_site *site) {
 }
 
 static void read_site(ov_reader *reader, ov_site *site) {
-    const ov_cif *cif = reader->cif;
+    ov_cif *cif = reader->cif;
     ov_field field;
     *site = (ov_site){.occupancy = 1.0f};
     copy_to(reader, first_given(cif, AUTH_ATOM, LABEL_ATOM), site->name, sizeof site->name);
@@ -361,7 +380,9 @@ static ovoid_status read_entity(ov_reader *reader, const ov_line *line) {
                                   cif->entity_count + 1, sizeof *cif->entities, "entities");
     if (status != OVOID_OK)
         return status;
-    ov_entity_type *entity = &cif->entities[cif->entity_count++];
+    ov_entity_type *entity = &cif->entities[cif->entity_count];
+    entity->order = cif->entity_count++;
+    cif->entities_sorted = false;
     const char *type = text_of(cif, 1);
     const size_t length = cif->row[1].length;
     ov_site_text(entity->id, sizeof entity->id, text_of(cif, 0), cif->row[0].length);

@@ -18,6 +18,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 /* Ends the program with a message, as a finding, unless what was promised holds. */
 void fuzz_require(bool holds, const char *promise);
 
+/* Begins an input: it may take 10 seconds of the processor's time, however busy the machine is.
+ * fuzz_file() does so for number 0. */
+void fuzz_begin(void);
+
 /* Path of a file in memory, number 0 or 1, that holds these bytes until the next call for the same
  * number. Nothing touches the disk. */
 const char *fuzz_file(int number, const void *data, size_t size);

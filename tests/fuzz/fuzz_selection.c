@@ -20,6 +20,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     char *text = malloc(size + 1), error[256] = "";
     if (!text)
         abort();
+    fuzz_begin();
     memcpy(text, data, size);
     text[size] = '\0';
     ov_selection *selection = ov_selection_create(text, error, sizeof error);

@@ -75,31 +75,43 @@ void ovoid_free(void *memory) {
     free(memory);
 }
 
-/* Length of the UTF-8 character that text begins with; 0 where it is none, or a control character
- * other than a line's end: logs of compilers have several lines. */
-static size_t character(const unsigned char *text) {
-    const unsigned char c = text[0];
-    const size_t length = c < 0x80   ? 1
-                          : c < 0xc2 ? 0
-                          : c < 0xe0 ? 2
-                          : c < 0xf0 ? 3
-                          : c < 0xf5 ? 4
-                                     : 0;
-    for (size_t i = 1; i < length; i++)
-        if ((text[i] & 0xc0) != 0x80)
+size_t ov_utf8_length(const unsigned char *text) {
+    size_t length = text[0] < 0x80 ? 1 : text[0] < 0xc2 ? 0 : text[0] < 0xe0 ? 2 : 3;
+    unsigned char low = 0x80, high = 0xbf; /* of the second byte */
+    if (text[0] >= 0xf0)
+        length = text[0] < 0xf5 ? 4 : 0;
+    if (text[0] == 0xe0)
+        low = 0xa0;
+    if (text[0] == 0xed)
+        high = 0x9f; /* surrogates */
+    if (text[0] == 0xf0)
+        low = 0x90;
+    if (text[0] == 0xf4)
+        high = 0x8f;
+    for (size_t i = 1; i < length; i++, low = 0x80, high = 0xbf)
+        if (text[i] < low || text[i] > high)
             return 0;
-    const bool control = (c < 0x20 && c != '\n') || c == 0x7f || (c == 0xc2 && text[1] < 0xa0);
-    return control ? 0 : length;
+    return length;
 }
 
-/* Messages quote what files and callers hold, and may be shown on a terminal, which control
- * characters play with: what is no text becomes '?'. */
+/* Control characters play with terminals. A line's end does not, and logs of compilers have several
+ * lines. */
+static bool is_control(const unsigned char *text) {
+    return (*text < 0x20 && *text != '\n') || *text == 0x7f || (*text == 0xc2 && text[1] < 0xa0);
+}
+
+/* Messages quote what files and callers hold, and may be shown on a terminal: what is no text, or
+ * would control that, becomes '?'. */
 static void make_printable(char *text) {
     for (unsigned char *c = (unsigned char *)text; *c;) {
-        const size_t length = character(c);
-        if (!length)
-            *c = *c == '\t' ? ' ' : '?';
-        c += length ? length : 1;
+        const size_t length = ov_utf8_length(c);
+        if (*c == '\t')
+            *c = ' ';
+        else if (!length || is_control(c))
+            *c = '?';
+        else
+            c += length - 1;
+        c++;
     }
 }
 

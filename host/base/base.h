@@ -44,6 +44,9 @@ void *ov_alloc(ovoid_context *context, size_t count, size_t size, const char *wh
 ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capacity, size_t need,
                      size_t size, const char *what);
 
+/* Bytes of the UTF-8 character at text, 0 if there is none (RFC 3629, section 4). */
+size_t ov_utf8_length(const unsigned char *text);
+
 /* Seconds of a monotonic clock. */
 double ov_seconds(void);
 

@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
-enum { RAW_ROOM = 256 * 1024, DATA_ROOM = 1024 * 1024 };
+enum { RAW_ROOM = OV_TEXT_RAW_ROOM, DATA_ROOM = OV_TEXT_ROOM };
 
 struct ov_text {
     ovoid_context *context;

@@ -169,6 +169,10 @@ static void long_ranges_cost_nothing(void **state) {
     assert_true(info[1].placements == UINT64_C(1) << 63);
     assert_int_equal(info[2].placements, 24);
     ovoid_molecule_destroy(&molecule);
+    /* The largest number has no next one. */
+    expect_failure("a.cif", CIF_ATOM CIF_PARTS "1 99999999999999999999-99999999999999999999 A\n",
+                   "1", OVOID_ERROR_FORMAT,
+                   "needs the operator 9223372036854775807, which is not there");
 }
 
 /* Placements are limited in all, not in each part of an assembly alone. */

@@ -315,10 +315,12 @@ static ovoid_status multiply_by_names(const names *met, void *user) {
     if (!met->range)
         return multiply_by_name(user, met->name);
     ovoid_status status = OVOID_OK;
-    for (long n = met->first; n <= met->last && status == OVOID_OK; n++) {
+    for (long n = met->first; n <= met->last; n++) {
         char name[24];
         snprintf(name, sizeof name, "%ld", n);
         status = multiply_by_name(user, name);
+        if (status != OVOID_OK || n == met->last) /* which may be the largest there is */
+            break;
     }
     return status;
 }

@@ -75,6 +75,46 @@ void ovoid_free(void *memory) {
     free(memory);
 }
 
+size_t ov_utf8_length(const unsigned char *text) {
+    size_t length = text[0] < 0x80 ? 1 : text[0] < 0xc2 ? 0 : text[0] < 0xe0 ? 2 : 3;
+    unsigned char low = 0x80, high = 0xbf; /* of the second byte */
+    if (text[0] >= 0xf0)
+        length = text[0] < 0xf5 ? 4 : 0;
+    if (text[0] == 0xe0)
+        low = 0xa0;
+    if (text[0] == 0xed)
+        high = 0x9f; /* surrogates */
+    if (text[0] == 0xf0)
+        low = 0x90;
+    if (text[0] == 0xf4)
+        high = 0x8f;
+    for (size_t i = 1; i < length; i++, low = 0x80, high = 0xbf)
+        if (text[i] < low || text[i] > high)
+            return 0;
+    return length;
+}
+
+/* Control characters play with terminals. A line's end does not, and logs of compilers have several
+ * lines. */
+static bool is_control(const unsigned char *text) {
+    return (*text < 0x20 && *text != '\n') || *text == 0x7f || (*text == 0xc2 && text[1] < 0xa0);
+}
+
+/* Messages quote what files and callers hold, and may be shown on a terminal: what is no text, or
+ * would control that, becomes '?'. */
+static void make_printable(char *text) {
+    for (unsigned char *c = (unsigned char *)text; *c;) {
+        const size_t length = ov_utf8_length(c);
+        if (*c == '\t')
+            *c = ' ';
+        else if (!length || is_control(c))
+            *c = '?';
+        else
+            c += length - 1;
+        c++;
+    }
+}
+
 static char *format_text(const char *format, va_list args) {
     va_list again;
     va_copy(again, args);
@@ -83,8 +123,10 @@ static char *format_text(const char *format, va_list args) {
     if (length < 0)
         return NULL;
     char *text = malloc((size_t)length + 1);
-    if (text)
-        vsnprintf(text, (size_t)length + 1, format, args);
+    if (!text)
+        return NULL;
+    vsnprintf(text, (size_t)length + 1, format, args);
+    make_printable(text);
     return text;
 }
 

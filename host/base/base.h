@@ -20,8 +20,9 @@ struct ovoid_context {
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */
 };
 
-/* Records the failure text (printf style) and returns status. context may be NULL. If even the text
- * cannot be stored, a fixed text stands in for it. */
+/* Records the failure text (printf style) and returns status. Bytes of it that are no UTF-8, and
+ * control characters but for ends of lines, become '?'; the same holds for warnings.
+ * context may be NULL. If even the text cannot be stored, a fixed text stands in for it. */
 #if defined(__GNUC__)
 __attribute__((format(printf, 3, 4)))
 #endif
@@ -42,6 +43,9 @@ void *ov_alloc(ovoid_context *context, size_t count, size_t size, const char *wh
  * is geometric. The new part is not cleared. */
 ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capacity, size_t need,
                      size_t size, const char *what);
+
+/* Bytes of the UTF-8 character at text, 0 if there is none (RFC 3629, section 4). */
+size_t ov_utf8_length(const unsigned char *text);
 
 /* Seconds of a monotonic clock. */
 double ov_seconds(void);

@@ -2,6 +2,7 @@
 
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 
 /* Whether the name of a file, .gz aside, ends so. */
 static bool ends_in(const char *path, const char *extension) {
@@ -11,11 +12,13 @@ static bool ends_in(const char *path, const char *extension) {
     return length > tail && strncasecmp(path + length - tail, extension, tail) == 0;
 }
 
-/* Whether the file begins as a model does: "# ovoid model", after a byte order mark or not. */
+/* Whether the file begins as a model does: "# ovoid model", after a byte order mark or not. What is
+ * no regular file, such as a pipe, gives its bytes once, and is not looked into. */
 static bool begins_as_model(const char *path) {
     static const char mark[] = "\xef\xbb\xbf", magic[] = "ovoid model";
     char text[64] = "";
-    FILE *stream = fopen(path, "rb");
+    struct stat info;
+    FILE *stream = stat(path, &info) == 0 && S_ISREG(info.st_mode) ? fopen(path, "rb") : NULL;
     if (!stream)
         return false;
     text[fread(text, 1, sizeof text - 1, stream)] = '\0';

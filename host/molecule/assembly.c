@@ -6,8 +6,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A capsid of 32 million atoms has 1,680 placements. */
-enum { PLACEMENTS_MAX = 1000000 };
+/* A capsid of 32 million atoms has 1,680 placements, and no entry of the PDB comes near the other
+ * limits: they keep memory and time in bounds that a file cannot move. Of generators, each goes
+ * through all residues. */
+enum {
+    PLACEMENTS_MAX = 1000000,
+    OPERATORS_MAX = 100000,
+    GENERATORS_MAX = 10000,
+    TEXT_BYTES_MAX = 1 << 24 /* of chains and expressions */
+};
 
 /* ---- what a file says ----------------------------------------------------------------------- */
 
@@ -22,12 +29,25 @@ void ov_assembly_source_destroy(ov_assembly_source *source) {
 }
 
 ovoid_status ov_assembly_add_operator(ovoid_context *context, ov_assembly_source *source,
+                                      const ov_text *text, const ov_line *line,
                                       const ov_operator *added) {
+    if (source->operator_count == OPERATORS_MAX)
+        return ov_text_limit(context, text, line->number, OPERATORS_MAX, "operators of assemblies");
     ovoid_status status = ov_grow(context, &source->operators, &source->operator_room,
                                   source->operator_count + 1, sizeof *added, "operators");
     if (status == OVOID_OK)
         source->operators[source->operator_count++] = *added;
     return status;
+}
+
+/* Before so much text of a generator is kept. */
+static ovoid_status count_text(ovoid_context *context, ov_assembly_source *source,
+                               const ov_text *text, const ov_line *line, size_t bytes) {
+    source->text_bytes += bytes;
+    if (source->text_bytes <= TEXT_BYTES_MAX)
+        return OVOID_OK;
+    return ov_text_limit(context, text, line->number, TEXT_BYTES_MAX,
+                         "bytes of text about assemblies");
 }
 
 static char *copy_text(ovoid_context *context, const char *text) {
@@ -36,11 +56,17 @@ static char *copy_text(ovoid_context *context, const char *text) {
 }
 
 ovoid_status ov_assembly_add_generator(ovoid_context *context, ov_assembly_source *source,
+                                       const ov_text *text, const ov_line *line,
                                        const char *assembly, const char *chains,
                                        const char *expression) {
+    if (source->generator_count == GENERATORS_MAX)
+        return ov_text_limit(context, text, line->number, GENERATORS_MAX, "parts of assemblies");
     ovoid_status status =
-        ov_grow(context, &source->generators, &source->generator_room, source->generator_count + 1,
-                sizeof *source->generators, "assemblies");
+        count_text(context, source, text, line,
+                   (chains ? strlen(chains) : 0) + (expression ? strlen(expression) : 0));
+    if (status == OVOID_OK)
+        status = ov_grow(context, &source->generators, &source->generator_room,
+                         source->generator_count + 1, sizeof *source->generators, "assemblies");
     if (status != OVOID_OK)
         return status;
     ov_generator *made = &source->generators[source->generator_count++];
@@ -71,17 +97,23 @@ static bool passes(const char **text, const char *end, const char *words) {
 
 /* Appends a list of chains to that of the last generator. "NULL" stands for a chain without name.
  */
-static ovoid_status add_chains(ovoid_context *context, ov_assembly_source *source, const char *text,
+static ovoid_status add_chains(ovoid_context *context, ov_assembly_source *source,
+                               const ov_text *text, const ov_line *line, const char *names,
                                const char *end) {
     ov_generator *last = &source->generators[source->generator_count - 1];
-    const size_t before = last->chains ? strlen(last->chains) : 0, length = (size_t)(end - text);
-    char *longer = realloc(last->chains, before + length + 2);
-    if (!longer)
-        return ov_fail(context, OVOID_ERROR_MEMORY, "out of memory for an assembly");
-    last->chains = longer;
-    longer[before] = ',';
-    memcpy(longer + before + (before > 0), text, length);
-    longer[before + (before > 0) + length] = '\0';
+    const size_t before = last->chains_length, length = (size_t)(end - names);
+    ovoid_status status = count_text(context, source, text, line, length + 1);
+    if (status == OVOID_OK)
+        status = ov_grow(context, &last->chains, &last->chains_room, before + length + 2, 1,
+                         "an assembly");
+    if (status != OVOID_OK)
+        return status;
+    char *at = last->chains + before;
+    if (before > 0)
+        *at++ = ',';
+    memcpy(at, names, length);
+    at[length] = '\0';
+    last->chains_length = (size_t)(at - last->chains) + length;
     return OVOID_OK;
 }
 
@@ -99,11 +131,11 @@ static ovoid_status read_biomt(ovoid_context *context, ov_assembly_source *sourc
         return ov_text_fail(text, line, line->text,
                             "BIOMT1, BIOMT2 and BIOMT3 are expected in turn");
     if (source->generator_count == 0)
-        OV_TRY(ov_assembly_add_generator(context, source,
+        OV_TRY(ov_assembly_add_generator(context, source, text, line,
                                          source->current[0] ? source->current : "1", NULL, NULL));
     ov_site_text(made.id, sizeof made.id, name, length);
     if (row == 0)
-        OV_TRY(ov_assembly_add_operator(context, source, &made));
+        OV_TRY(ov_assembly_add_operator(context, source, text, line, &made));
     ov_operator *current = &source->operators[source->operator_count - 1];
     for (int k = 0; k < 4; k++) {
         ov_number number;
@@ -133,15 +165,18 @@ ovoid_status ov_assembly_remark(ovoid_context *context, ov_assembly_source *sour
         return OVOID_OK;
     }
     const bool begins = passes(&at, end, "APPLY THE FOLLOWING TO CHAINS:");
+    if (begins && source->rows % 3 != 0) /* whose operator would it be? */
+        return ov_text_fail(text, line, line->text, "a list of chains between BIOMT%d and BIOMT%d",
+                            source->rows, source->rows + 1);
     if (begins) {
         ovoid_status status = ov_assembly_add_generator(
-            context, source, source->current[0] ? source->current : "1", NULL, NULL);
+            context, source, text, line, source->current[0] ? source->current : "1", NULL, NULL);
         if (status != OVOID_OK)
             return status;
     }
     if (begins || (source->generator_count && passes(&at, end, "AND CHAINS:"))) {
         trim(&at, &end);
-        return add_chains(context, source, at, end);
+        return add_chains(context, source, text, line, at, end);
     }
     if (passes(&at, end, "BIOMT"))
         return read_biomt(context, source, text, line, at, end);
@@ -171,37 +206,38 @@ static const ov_operator *find_operator(ov_assembly_source *source, const char *
     return bsearch(&key, source->operators, source->operator_count, sizeof key, by_id);
 }
 
-/* What is done while a name of an expression is met. */
-typedef ovoid_status (*on_name)(const char *name, void *user);
+/* A name of an expression, or the names from one number to another. */
+typedef struct names {
+    char name[64]; /* as it is in the text, cut */
+    bool range;
+    long first, last; /* of a range, not negative */
+} names;
 
-/* Calls for the names from "first" to "last", both numbers, where the text is "3-60". */
-static ovoid_status each_of_range(char *text, on_name fn, void *user) {
-    char *dash = strchr(text, '-'), *end_first, *end_last;
-    const long first = strtol(text, &end_first, 10);
-    const long last = dash ? strtol(dash + 1, &end_last, 10) : 0;
-    if (!dash || dash == text || end_first != dash || *end_last || end_last == dash + 1)
-        return fn(text, user);
-    for (long n = first; n <= last; n++) {
-        char name[24];
-        snprintf(name, sizeof name, "%ld", n);
-        ovoid_status status = fn(name, user);
-        if (status != OVOID_OK || n - first > PLACEMENTS_MAX)
-            return status;
-    }
-    return OVOID_OK;
+/* What is done with these. */
+typedef ovoid_status (*on_names)(const names *met, void *user);
+
+/* Recognises "3-60". */
+static void find_range(names *met) {
+    const char *dash = strchr(met->name, '-');
+    char *end_first, *end_last;
+    met->first = strtol(met->name, &end_first, 10);
+    met->last = dash ? strtol(dash + 1, &end_last, 10) : 0;
+    met->range =
+        dash && dash != met->name && end_first == dash && !*end_last && end_last != dash + 1;
 }
 
-/* Calls for each name of "1,3-5,P". */
-static ovoid_status each_name(const char *text, const char *end, on_name fn, void *user) {
-    char name[64];
+/* Calls for each name or range of "1,3-5,P". */
+static ovoid_status each_name(const char *text, const char *end, on_names fn, void *user) {
+    names met;
     ovoid_status status = OVOID_OK;
     while (text <= end && status == OVOID_OK) {
         const char *comma = memchr(text, ',', (size_t)(end - text));
         const char *stop = comma ? comma : end, *first = text, *last = stop;
         trim(&first, &last);
-        ov_site_text(name, sizeof name, first, (size_t)(last - first));
-        if (name[0])
-            status = each_of_range(name, fn, user);
+        ov_site_text(met.name, sizeof met.name, first, (size_t)(last - first));
+        find_range(&met);
+        if (met.name[0])
+            status = fn(&met, user);
         text = stop + 1;
     }
     return status;
@@ -247,13 +283,16 @@ static ovoid_placement compose(const ovoid_placement *a, const ov_operator *b) {
     return c;
 }
 
+static ovoid_status too_many(const multiplication *m) {
+    return ov_fail(m->context, OVOID_ERROR_LIMIT, "%s: assembly %s has more than %d placements",
+                   m->name, m->assembly, PLACEMENTS_MAX);
+}
+
 static ovoid_status multiply(multiplication *m, const ov_operator *by) {
     ovoid_status status = OVOID_OK;
     for (size_t i = 0; i < m->left->count; i++) {
         if (m->result->count >= PLACEMENTS_MAX)
-            return ov_fail(m->context, OVOID_ERROR_LIMIT,
-                           "%s: assembly %s has more than %d placements", m->name, m->assembly,
-                           PLACEMENTS_MAX);
+            return too_many(m);
         OV_TRY(ov_grow(m->context, &m->result->placements, &m->result->room, m->result->count + 1,
                        sizeof *m->result->placements, "placements"));
         m->result->placements[m->result->count++] = compose(&m->left->placements[i], by);
@@ -262,14 +301,28 @@ cleanup:
     return status;
 }
 
-static ovoid_status multiply_by_name(const char *name, void *user) {
-    multiplication *m = user;
+static ovoid_status multiply_by_name(multiplication *m, const char *name) {
     const ov_operator *by = find_operator(m->source, name);
     if (!by)
         return ov_fail(m->context, OVOID_ERROR_FORMAT,
                        "%s: assembly %s needs the operator %s, which is not there", m->name,
                        m->assembly, name);
     return multiply(m, by);
+}
+
+/* Ends early: at a number that is no operator's, or with more placements than there may be. */
+static ovoid_status multiply_by_names(const names *met, void *user) {
+    if (!met->range)
+        return multiply_by_name(user, met->name);
+    ovoid_status status = OVOID_OK;
+    for (long n = met->first; n <= met->last; n++) {
+        char name[24];
+        snprintf(name, sizeof name, "%ld", n);
+        status = multiply_by_name(user, name);
+        if (status != OVOID_OK || n == met->last) /* which may be the largest there is */
+            break;
+    }
+    return status;
 }
 
 /* The order is that of the text: the left factor varies slowest. */
@@ -294,11 +347,13 @@ static ovoid_status evaluate(multiplication *m, const ov_generator *generator, p
         OV_TRY(multiply(m, &m->source->operators[generator->first + i]));
     while (at && next_factor(&at, &first, &end)) {
         result = (product){0};
-        OV_TRY(each_name(first, end, multiply_by_name, m));
+        OV_TRY(each_name(first, end, multiply_by_names, m));
         if (result.count == 0) {
-            status = ov_fail(m->context, OVOID_ERROR_FORMAT,
-                             "%s: assembly %s: its expression names no operator: %.80s", m->name,
-                             m->assembly, generator->expression);
+            ov_quote quote;
+            status = ov_fail(
+                m->context, OVOID_ERROR_FORMAT,
+                "%s: assembly %s: its expression names no operator: %s", m->name, m->assembly,
+                ov_quote_text(&quote, generator->expression, strlen(generator->expression)));
             goto cleanup;
         }
         room = ov_alloc(m->context, result.count, sizeof *room, "placements");
@@ -319,6 +374,8 @@ static ovoid_status evaluate(multiplication *m, const ov_generator *generator, p
         result = left.placements == &one ? (product){0} : left;
         left = (product){&one, 1, 1};
     }
+    if (all->count + result.count > PLACEMENTS_MAX)
+        OV_TRY(too_many(m));
     OV_TRY(ov_grow(m->context, &all->placements, &all->room, all->count + result.count + 1,
                    sizeof *all->placements, "placements"));
     for (size_t i = 0; i < result.count; i++) {
@@ -382,9 +439,17 @@ static size_t mark(const ovoid_molecule *m, const ov_sites *sites, const ov_gene
 
 /* ---- the list -------------------------------------------------------------------------------- */
 
-static ovoid_status count_name(const char *name, void *user) {
-    (void)name;
-    ++*(uint64_t *)user;
+static uint64_t saturated(uint64_t sum, uint64_t a, uint64_t b) {
+    const uint64_t more = a && b > UINT64_MAX / a ? UINT64_MAX : a * b;
+    return more > UINT64_MAX - sum ? UINT64_MAX : sum + more;
+}
+
+static ovoid_status count_names(const names *met, void *user) {
+    uint64_t *count = user;
+    const uint64_t more = !met->range               ? 1
+                          : met->last >= met->first ? (uint64_t)(met->last - met->first) + 1
+                                                    : 0;
+    *count = saturated(*count, more, 1);
     return OVOID_OK;
 }
 
@@ -395,17 +460,12 @@ static uint64_t count_placements(const ov_generator *generator) {
     if (!at)
         return generator->operators;
     while (next_factor(&at, &first, &end)) {
-        uint64_t names = 0;
-        each_name(first, end, count_name, &names);
-        total = names && total > UINT64_MAX / names ? UINT64_MAX : total * names;
+        uint64_t count = 0;
+        each_name(first, end, count_names, &count);
+        total = saturated(0, total, count);
         any = true;
     }
     return any ? total : 0;
-}
-
-static uint64_t saturated(uint64_t sum, uint64_t a, uint64_t b) {
-    const uint64_t more = a && b > UINT64_MAX / a ? UINT64_MAX : a * b;
-    return more > UINT64_MAX - sum ? UINT64_MAX : sum + more;
 }
 
 static ovoid_assembly_info *info_of(ovoid_molecule *m, const char *id) {
@@ -440,17 +500,19 @@ static ovoid_status list(ov_reader *reader, bool named, unsigned char *marked) {
 
 static ovoid_status no_such(const ov_reader *reader) {
     const ovoid_molecule *m = reader->molecule;
-    char text[256] = "";
+    char wanted[16], text[256] = "";
     size_t used = 0;
+    ov_site_text(wanted, sizeof wanted, reader->options->assembly,
+                 strlen(reader->options->assembly));
     for (size_t i = 0; i < m->assembly_count && used < sizeof text - 20; i++)
         used += (size_t)snprintf(text + used, sizeof text - used, "%s%s", i ? ", " : "",
                                  m->assemblies[i].id);
     if (m->assembly_count == 0)
         return ov_fail(reader->context, OVOID_ERROR_ARGUMENT,
                        "%s: no assembly %s: the file describes none", ov_text_name(reader->text),
-                       reader->options->assembly);
+                       wanted);
     return ov_fail(reader->context, OVOID_ERROR_ARGUMENT, "%s: no assembly %s: the file has %s",
-                   ov_text_name(reader->text), reader->options->assembly, text);
+                   ov_text_name(reader->text), wanted, text);
 }
 
 /* Rotations alone keep the shape of what they turn. */

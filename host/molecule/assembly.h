@@ -16,7 +16,8 @@ typedef struct ov_operator {
 /* What an assembly does with some of the chains; it may have several of these. */
 typedef struct ov_generator {
     char assembly[16];
-    char *chains;     /* names with commas or blanks between them, owned; NULL: all */
+    char *chains; /* names with commas or blanks between them, owned; NULL: all */
+    size_t chains_length, chains_room;
     char *expression; /* of operators' names, owned; NULL: the operators from `first` on */
     size_t first, operators;
 } ov_generator;
@@ -28,8 +29,9 @@ typedef struct ov_assembly_source {
     bool sorted; /* operators are in the order of their names */
     ov_generator *generators;
     size_t generator_count, generator_room;
-    char current[16]; /* REMARK 350: the assembly that is being described */
-    int rows;         /* REMARK 350: of the last operator that are there, 0 to 3 */
+    size_t text_bytes; /* of chains and expressions of all generators */
+    char current[16];  /* REMARK 350: the assembly that is being described */
+    int rows;          /* REMARK 350: of the last operator that are there, 0 to 3 */
 } ov_assembly_source;
 
 void ov_assembly_source_destroy(ov_assembly_source *source);
@@ -38,11 +40,14 @@ void ov_assembly_source_destroy(ov_assembly_source *source);
 ovoid_status ov_assembly_remark(ovoid_context *context, ov_assembly_source *source, ov_text *text,
                                 const ov_line *line);
 
+/* OVOID_ERROR_LIMIT, at `line` of the text, where there are more than any file has. */
 ovoid_status ov_assembly_add_operator(ovoid_context *context, ov_assembly_source *source,
+                                      const ov_text *text, const ov_line *line,
                                       const ov_operator *added);
 
-/* chains and expression are copied. */
+/* The same. chains and expression are copied. */
 ovoid_status ov_assembly_add_generator(ovoid_context *context, ov_assembly_source *source,
+                                       const ov_text *text, const ov_line *line,
                                        const char *assembly, const char *chains,
                                        const char *expression);
 

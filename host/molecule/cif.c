@@ -69,7 +69,10 @@ static bool next_token(const char **at, const char *end, token *t, bool *open_qu
 
 /* ---- categories ----------------------------------------------------------------------------- */
 
-enum { WIDEST = 32 }; /* columns of a category */
+enum { WIDEST = 32 }; /* columns of a category that are read */
+
+/* More than any file has: what is kept does not grow with a file that makes no sense. */
+enum { COLUMNS_MAX = 10000, ENTITIES_MAX = 10000, ROW_BYTES_MAX = 1 << 20 };
 
 enum {
     ID,
@@ -143,6 +146,7 @@ enum { CATEGORIES = sizeof categories / sizeof categories[0], NONE = -1, IGNORED
 typedef struct ov_entity_type {
     char id[12];
     ov_entity entity;
+    size_t order; /* in the file: of several with the same id the first counts */
 } ov_entity_type;
 
 /* A value of the current row. */
@@ -177,6 +181,7 @@ struct ov_cif {
 
     ov_entity_type *entities;
     size_t entity_count, entity_room;
+    bool entities_sorted;
 };
 
 void ov_cif_destroy(ov_cif **cif) {
@@ -195,7 +200,7 @@ static bool given(const ov_cif *cif, int column) {
 }
 
 static const char *text_of(const ov_cif *cif, int column) {
-    return cif->text + cif->row[column].at;
+    return cif->text ? cif->text + cif->row[column].at : ""; /* no value yet, nor a text */
 }
 
 /* The first of two columns that has a value, NONE if neither has. */
@@ -226,6 +231,16 @@ static ovoid_status fail_at_value(ov_reader *reader, int column, const char *wha
                    ov_quote_text(&quote, text_of(reader->cif, column), v->length));
 }
 
+/* Says what is wrong with a coordinate. Here, as a row goes over several lines, and only we know in
+ * which of them a value is. */
+static ovoid_status fail_at_coordinate(ov_reader *reader, int axis, const char *fault) {
+    const value *v = &reader->cif->row[X + axis];
+    ov_quote quote;
+    return ov_fail(reader->context, OVOID_ERROR_FORMAT, "%s:%llu:%zu: %c is %s: %s",
+                   ov_text_name(reader->text), (unsigned long long)v->line, v->column, 'x' + axis,
+                   ov_quote_text(&quote, text_of(reader->cif, X + axis), v->length), fault);
+}
+
 /* Reads a number; one in parentheses behind it, a standard uncertainty, is passed over. */
 static bool parse_real(const ov_cif *cif, int column, ov_field *field) {
     const value *v = &cif->row[column];
@@ -249,7 +264,7 @@ static bool parse_integer(const ov_cif *cif, int column, int32_t *number) {
 static void read_number(const ov_cif *cif, ov_site *site) {
     const int column = first_given(cif, AUTH_SEQ, LABEL_SEQ);
     if (given(cif, INSERTION))
-        site->insertion = *text_of(cif, INSERTION);
+        site->insertion = ov_site_letter(*text_of(cif, INSERTION));
     site->number = OVOID_NO_NUMBER;
     if (column == NONE || parse_integer(cif, column, &site->number))
         return;
@@ -264,15 +279,32 @@ static void read_number(const ov_cif *cif, ov_site *site) {
     }
 }
 
-static ov_entity entity_of(const ov_cif *cif) {
-    char id[12];
-    if (!given(cif, ENTITY))
+static int by_id(const void *a, const void *b) {
+    const ov_entity_type *x = a, *y = b;
+    const int ids = memcmp(x->id, y->id, sizeof x->id);
+    return ids ? ids : (x->order > y->order) - (x->order < y->order);
+}
+
+static ov_entity entity_of(ov_cif *cif) {
+    ov_entity_type wanted = {.order = 0};
+    if (!given(cif, ENTITY) || !cif->entity_count)
         return OV_ENTITY_UNKNOWN;
-    ov_site_text(id, sizeof id, text_of(cif, ENTITY), cif->row[ENTITY].length);
-    for (size_t i = 0; i < cif->entity_count; i++)
-        if (memcmp(cif->entities[i].id, id, sizeof id) == 0)
-            return cif->entities[i].entity;
-    return OV_ENTITY_UNKNOWN;
+    ov_site_text(wanted.id, sizeof wanted.id, text_of(cif, ENTITY), cif->row[ENTITY].length);
+    if (!cif->entities_sorted)
+        qsort(cif->entities, cif->entity_count, sizeof wanted, by_id);
+    cif->entities_sorted = true;
+    size_t low = 0, high = cif->entity_count; /* the first that is not before the wanted one */
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (by_id(&cif->entities[middle], &wanted) < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    const ov_entity_type *found = &cif->entities[low];
+    return low < cif->entity_count && memcmp(found->id, wanted.id, sizeof wanted.id) == 0
+               ? found->entity
+               : OV_ENTITY_UNKNOWN;
 }
 
 static void read_element(ov_reader *reader, ov_site *site) {
@@ -283,7 +315,7 @@ static void read_element(ov_reader *reader, ov_site *site) {
 }
 
 static void read_site(ov_reader *reader, ov_site *site) {
-    const ov_cif *cif = reader->cif;
+    ov_cif *cif = reader->cif;
     ov_field field;
     *site = (ov_site){.occupancy = 1.0f};
     copy_to(reader, first_given(cif, AUTH_ATOM, LABEL_ATOM), site->name, sizeof site->name);
@@ -292,7 +324,7 @@ static void read_site(ov_reader *reader, ov_site *site) {
     copy_to(reader, first_given(cif, LABEL_ASYM, AUTH_ASYM), site->part, sizeof site->part);
     read_number(cif, site);
     read_element(reader, site);
-    site->altloc = given(cif, ALT) ? *text_of(cif, ALT) : '\0';
+    site->altloc = given(cif, ALT) ? ov_site_letter(*text_of(cif, ALT)) : '\0';
     site->hetero = given(cif, GROUP) && *text_of(cif, GROUP) == 'H';
     site->entity = entity_of(cif);
     parse_integer(cif, ID, &site->serial);
@@ -310,17 +342,15 @@ static ovoid_status read_atom(ov_reader *reader, const ov_line *line) {
     parse_integer(reader->cif, MODEL, &model);
     if (!ov_sites_wanted_of(reader, model))
         return OVOID_OK;
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         if (!parse_real(reader->cif, X + i, &xyz[i]))
             return fail_at_value(reader, X + i, names[i]);
+        const char *fault = ov_reader_fault((size_t)i, xyz[i].number.value);
+        if (fault)
+            return fail_at_coordinate(reader, i, fault);
+    }
     read_site(reader, &site);
-    /* The row's text is a copy; errors are to name the place in the line, if it is all in one. */
-    const ov_line copy = {reader->cif->text, reader->cif->text_length, reader->cif->row[X].line};
-    const bool one_line = copy.number == line->number && reader->cif->row[Z].line == line->number;
-    for (int i = 0; i < 3 && one_line; i++)
-        xyz[i].text = line->text + reader->cif->row[X + i].column - 1;
-    return ov_reader_add_site(reader, one_line ? line : &copy, &xyz[0], &xyz[1], &xyz[2], NULL,
-                              &site);
+    return ov_reader_add_site(reader, line, &xyz[0], &xyz[1], &xyz[2], NULL, &site);
 }
 
 static ovoid_status check_atom_columns(ov_reader *reader, const ov_line *line) {
@@ -342,14 +372,17 @@ static ovoid_status check_atom_columns(ov_reader *reader, const ov_line *line) {
 
 static ovoid_status read_entity(ov_reader *reader, const ov_line *line) {
     ov_cif *cif = reader->cif;
-    (void)line;
     if (!given(cif, 0) || !given(cif, 1))
         return OVOID_OK;
+    if (cif->entity_count == ENTITIES_MAX)
+        return ov_text_limit(reader->context, reader->text, line->number, ENTITIES_MAX, "entities");
     ovoid_status status = ov_grow(reader->context, &cif->entities, &cif->entity_room,
                                   cif->entity_count + 1, sizeof *cif->entities, "entities");
     if (status != OVOID_OK)
         return status;
-    ov_entity_type *entity = &cif->entities[cif->entity_count++];
+    ov_entity_type *entity = &cif->entities[cif->entity_count];
+    entity->order = cif->entity_count++;
+    cif->entities_sorted = false;
     const char *type = text_of(cif, 1);
     const size_t length = cif->row[1].length;
     ov_site_text(entity->id, sizeof entity->id, text_of(cif, 0), cif->row[0].length);
@@ -366,7 +399,6 @@ static ovoid_status read_operator(ov_reader *reader, const ov_line *line) {
     const ov_cif *cif = reader->cif;
     ov_operator made = {{0}, {0}, {0}};
     ov_field field;
-    (void)line;
     if (!given(cif, 0) ||
         !ov_site_text(made.id, sizeof made.id, text_of(cif, 0), cif->row[0].length))
         return OVOID_OK;
@@ -375,16 +407,16 @@ static ovoid_status read_operator(ov_reader *reader, const ov_line *line) {
             return OVOID_OK;
         *(k < 9 ? &made.rotation[k] : &made.translation[k - 9]) = field.number.value;
     }
-    return ov_assembly_add_operator(reader->context, &reader->assemblies, &made);
+    return ov_assembly_add_operator(reader->context, &reader->assemblies, reader->text, line,
+                                    &made);
 }
 
 static ovoid_status read_generator(ov_reader *reader, const ov_line *line) {
     const ov_cif *cif = reader->cif;
-    (void)line;
     if (!given(cif, 0) || !given(cif, 1) || !given(cif, 2))
         return OVOID_OK;
-    return ov_assembly_add_generator(reader->context, &reader->assemblies, text_of(cif, 0),
-                                     text_of(cif, 2), text_of(cif, 1));
+    return ov_assembly_add_generator(reader->context, &reader->assemblies, reader->text, line,
+                                     text_of(cif, 0), text_of(cif, 2), text_of(cif, 1));
 }
 
 /* ---- rows ------------------------------------------------------------------------------------ */
@@ -441,8 +473,11 @@ static int find_column(int category, const token *t) {
     return NONE;
 }
 
-static ovoid_status add_column(ov_reader *reader, int column) {
+static ovoid_status add_column(ov_reader *reader, const ov_line *line, int column) {
     ov_cif *cif = reader->cif;
+    if (cif->columns == COLUMNS_MAX)
+        return ov_text_limit(reader->context, reader->text, line->number, COLUMNS_MAX,
+                             "names of a loop");
     ovoid_status status = ov_grow(reader->context, &cif->column, &cif->column_room,
                                   cif->columns + 1, sizeof *cif->column, "names of a loop");
     if (status == OVOID_OK)
@@ -457,7 +492,8 @@ static ovoid_status take_tag(ov_reader *reader, const ov_line *line, const token
     if (cif->loop && cif->header) {
         if (cif->columns == 0)
             cif->category = category;
-        return add_column(reader, category == cif->category ? find_column(category, t) : NONE);
+        return add_column(reader, line,
+                          category == cif->category ? find_column(category, t) : NONE);
     }
     if (cif->loop || cif->pending_tag || category != cif->category || category < 0)
         OV_TRY(end_category(reader, line));
@@ -465,7 +501,7 @@ static ovoid_status take_tag(ov_reader *reader, const ov_line *line, const token
     cif->columns = 0;
     cif->begins = line->number;
     cif->pending_tag = true;
-    status = add_column(reader, find_column(category, t));
+    status = add_column(reader, line, find_column(category, t));
 cleanup:
     return status;
 }
@@ -476,6 +512,9 @@ static ovoid_status keep_value(ov_reader *reader, const ov_line *line, const tok
     const int column = cif->column[cif->loop ? cif->next : 0];
     if (column == NONE || cif->category < 0)
         return OVOID_OK;
+    if (cif->text_length + t->length > ROW_BYTES_MAX)
+        return ov_text_limit(reader->context, reader->text, line->number, ROW_BYTES_MAX,
+                             "bytes of a row");
     ovoid_status status = ov_grow(reader->context, &cif->text, &cif->text_room,
                                   cif->text_length + t->length + 1, 1, "a row");
     if (status != OVOID_OK)
@@ -543,10 +582,19 @@ cleanup:
 
 /* ---- lines ----------------------------------------------------------------------------------- */
 
+/* Whether the value to come is of a column that is read. */
+static bool is_wanted(const ov_cif *cif) {
+    const size_t column = cif->loop ? cif->next : 0;
+    return cif->category >= 0 && column < cif->columns && cif->column[column] != NONE;
+}
+
 static ovoid_status field_line(ov_reader *reader, const char *text, size_t length) {
     ov_cif *cif = reader->cif;
-    if (cif->category < 0) /* nobody wants it */
+    if (!is_wanted(cif))
         return OVOID_OK;
+    if (cif->field_length + length > ROW_BYTES_MAX)
+        return ov_text_limit(reader->context, reader->text, cif->field_begins, ROW_BYTES_MAX,
+                             "bytes of a text between lines that begin with ';'");
     ovoid_status status = ov_grow(reader->context, &cif->field_text, &cif->field_room,
                                   cif->field_length + length + 1, 1, "a text field");
     if (status != OVOID_OK)

@@ -10,8 +10,7 @@
 
 static const char *const axis_names[] = {"x", "y", "z", "the radius"};
 
-/* What is wrong with value i of x, y, z, radius; NULL if nothing is. */
-static const char *fault(size_t i, double value) {
+const char *ov_reader_fault(size_t i, double value) {
     if (!isfinite(value))
         return "not a finite number";
     if (i < 3)
@@ -34,7 +33,7 @@ ovoid_status ov_reader_add(ov_reader *reader, const ov_line *line, const ov_fiel
     double *atom = molecule->xyzr + 4 * molecule->atoms;
     for (size_t i = 0; i < 4; i++) {
         atom[i] = fields[i] ? fields[i]->number.value : 0.0;
-        const char *what = fault(i, atom[i]);
+        const char *what = ov_reader_fault(i, atom[i]);
         ov_quote quote;
         if (what)
             return ov_text_fail(reader->text, line, fields[i]->text, "%s is %s: %s", axis_names[i],
@@ -116,9 +115,10 @@ static ovoid_molecule_format format_by_line(const ov_line *line) {
 
 /*
  * What looks like PQR may be a PDB file, and standard input cannot be read twice. So the first
- * lines are kept, and read as PDB where that shows.
+ * lines are kept, and read as PDB where that shows. Lines are counted as well as their bytes, for
+ * they may be empty.
  */
-enum { LOOK_AHEAD_ATOMS = 1000, LOOK_AHEAD_BYTES = 8 << 20 };
+enum { LOOK_AHEAD_ATOMS = 1000, LOOK_AHEAD_BYTES = 8 << 20, LOOK_AHEAD_LINES = 200000 };
 
 typedef struct ahead {
     bool open; /* not decided yet */
@@ -187,7 +187,7 @@ static ovoid_status try_pqr(ov_reader *reader, const ov_line *line, ahead *kept,
     }
     if (status != OVOID_OK)
         return status;
-    if (reader->pdb.cleared || kept->length > LOOK_AHEAD_BYTES) {
+    if (reader->pdb.cleared || kept->length > LOOK_AHEAD_BYTES || kept->count > LOOK_AHEAD_LINES) {
         forget(kept);
     } else if (reader->molecule->atoms >= LOOK_AHEAD_ATOMS) {
         *pdb = ov_pqr_is_pdb(reader);
@@ -508,7 +508,7 @@ ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, s
         return ov_fail(context, OVOID_ERROR_EMPTY, "ovoid_molecule_create: no atoms");
     for (size_t i = 0; i < atoms; i++) {
         for (size_t k = 0; k < 4; k++) {
-            const char *what = fault(k, xyzr[4 * i + k]);
+            const char *what = ov_reader_fault(k, xyzr[4 * i + k]);
             if (what)
                 return ov_fail(context, OVOID_ERROR_ARGUMENT,
                                "ovoid_molecule_create: %s of atom %zu (from 0) is %g: %s",

@@ -33,7 +33,7 @@ static piece columns(const ov_line *line, size_t first, size_t width) {
 }
 
 static char column(const ov_line *line, size_t at) {
-    return at < line->length && !ov_blank(line->text[at]) ? line->text[at] : '\0';
+    return at < line->length && !ov_blank(line->text[at]) ? ov_site_letter(line->text[at]) : '\0';
 }
 
 /* ---- numbers ------------------------------------------------------------------------------- */

@@ -361,7 +361,7 @@ static void read_number(const ov_word *word, ov_site *site) {
         return;
     site->number = (int32_t)number.value;
     if (at + used + 1 == word->length)
-        site->insertion = word->text[at + used];
+        site->insertion = ov_site_letter(word->text[at + used]);
 }
 
 /* The words in front of x: [serial] name residue [chain] number [insertion code]. */
@@ -389,7 +389,7 @@ static void read_names(ov_reader *reader, const char *begin, const char *x, ov_s
         else if (site->number == OVOID_NO_NUMBER)
             read_number(&words[i], site);
         else if (words[i].length == 1)
-            site->insertion = *words[i].text;
+            site->insertion = ov_site_letter(*words[i].text);
     }
 }
 

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { ROWS_MAX = 1000000 }; /* no list of residues has so many atoms */
+
 typedef struct row {
     char residue[8], atom[8];
     double radius;
@@ -69,6 +71,8 @@ static ovoid_status add_element(ov_radii_table *table, ov_text *text, const ov_l
 static ovoid_status add_row(ovoid_context *context, ov_radii_table *table, ov_text *text,
                             const ov_line *line, const char *const words[3],
                             const size_t lengths[3], double radius) {
+    if (table->count == ROWS_MAX)
+        return ov_text_limit(context, text, line->number, ROWS_MAX, "radii");
     ovoid_status status =
         ov_grow(context, &table->rows, &table->room, table->count + 1, sizeof(row), "radii");
     if (status != OVOID_OK)

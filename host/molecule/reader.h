@@ -50,6 +50,9 @@ typedef struct ov_reader {
     struct ov_cif *cif; /* cif.c */
 } ov_reader;
 
+/* What is wrong with value i of x, y, z, radius, as "beyond 1e6 angstrom"; NULL if nothing is. */
+const char *ov_reader_fault(size_t i, double value);
+
 /* Appends an atom after checking that x, y, z and radius are finite and within the limits. A radius
  * of NULL is one that comes later. */
 ovoid_status ov_reader_add(ov_reader *reader, const ov_line *line, const ov_field *x,

@@ -16,9 +16,14 @@ void ov_sites_destroy(ov_sites *sites) {
     ov_sites_init(sites);
 }
 
+char ov_site_letter(char c) {
+    return (c > 0 && c < 0x20) || c == 0x7f ? '?' : c;
+}
+
 bool ov_site_text(char *field, size_t size, const char *text, size_t length) {
     const size_t kept = length < size ? length : size - 1;
-    memcpy(field, text, kept);
+    for (size_t i = 0; i < kept; i++)
+        field[i] = ov_site_letter(text[i]);
     memset(field + kept, 0, size - kept);
     return kept == length;
 }

@@ -58,8 +58,12 @@ enum { OV_NO_MODEL = INT32_MIN };
 void ov_sites_init(ov_sites *sites);
 void ov_sites_destroy(ov_sites *sites);
 
-/* Copies text into a field of `size` bytes and fills it up; false where it had to be cut. */
+/* Copies text into a field of `size` bytes and fills it up; false where it had to be cut. Control
+ * characters become '?': names are shown on terminals and written into tables. */
 bool ov_site_text(char *field, size_t size, const char *text, size_t length);
+
+/* The same of one character, which may be 0. */
+char ov_site_letter(char c);
 
 /* A model of this number (OV_NO_MODEL: one more than the last) is to come; one has ended. */
 void ov_sites_announce_model(ov_sites *sites, int32_t number);

@@ -108,13 +108,21 @@ struct ov_selection {
     std::string chain;
 };
 
+/* What gemmi says holds the text it was given, whatever that is. */
+static void copy_error(const char *text, char *error, size_t size) {
+    std::snprintf(error, size, "%s", text);
+    for (char *c = error; size && *c; c++)
+        if (std::iscntrl(static_cast<unsigned char>(*c)))
+            *c = '?';
+}
+
 ov_selection *ov_selection_create(const char *text, char *error, size_t size) {
     try {
         return new ov_selection{gemmi::Selection(text), {}, {}, {}};
     } catch (const std::bad_alloc &) {
         std::snprintf(error, size, "out of memory");
     } catch (const std::exception &e) {
-        std::snprintf(error, size, "%s", e.what());
+        copy_error(e.what(), error, size);
     } catch (...) {
         std::snprintf(error, size, "cannot be parsed");
     }

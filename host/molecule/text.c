@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
-enum { RAW_ROOM = 256 * 1024, DATA_ROOM = 1024 * 1024 };
+enum { RAW_ROOM = OV_TEXT_RAW_ROOM, DATA_ROOM = OV_TEXT_ROOM };
 
 struct ov_text {
     ovoid_context *context;
@@ -306,6 +306,12 @@ ovoid_status ov_text_fail(ov_text *text, const ov_line *line, const char *at, co
     va_end(args);
     return ov_fail(text->context, OVOID_ERROR_FORMAT, "%s:%llu:%zu: %s", text->name,
                    (unsigned long long)line->number, (size_t)(at - line->text) + 1, reason);
+}
+
+ovoid_status ov_text_limit(ovoid_context *context, const ov_text *text, uint64_t line, size_t most,
+                           const char *what) {
+    return ov_fail(context, OVOID_ERROR_LIMIT, "%s:%llu:1: more than %zu %s", text->name,
+                   (unsigned long long)line, most, what);
 }
 
 const char *ov_quote_text(ov_quote *quote, const char *text, size_t length) {

@@ -16,8 +16,14 @@ typedef struct ov_line {
     uint64_t number; /* from 1 */
 } ov_line;
 
-/* Longest line that is read, in bytes. */
+/* Longest line that is read, in bytes; and room for bytes of the file and for text, which has to be
+ * more than such a line. Builds for fuzzing make them small (CMakeLists.txt), so that
+ * small inputs come to their limits. */
+#ifndef OV_TEXT_LONGEST_LINE
 #define OV_TEXT_LONGEST_LINE ((size_t)64 * 1024)
+#define OV_TEXT_RAW_ROOM ((size_t)256 * 1024)
+#define OV_TEXT_ROOM ((size_t)1024 * 1024)
+#endif
 
 /* Opens path, "-" for standard input. gzip is recognised by content (members in a row are one
  * text); a UTF-8 byte order mark is dropped. OVOID_ERROR_IO where the file cannot be opened or
@@ -44,6 +50,11 @@ __attribute__((format(printf, 4, 5)))
 #endif
 ovoid_status
 ov_text_fail(ov_text *text, const ov_line *line, const char *at, const char *format, ...);
+
+/* Records OVOID_ERROR_LIMIT as "name:line:1: more than `most` `what`", of something that no
+ * molecule's file has so many of: memory is not to follow such a file. */
+ovoid_status ov_text_limit(ovoid_context *context, const ov_text *text, uint64_t line, size_t most,
+                           const char *what);
 
 /* Room for a piece of a file in quotes in a message. */
 typedef struct ov_quote {

@@ -3,32 +3,12 @@
 
 #include <string.h>
 
-/* Bytes of the UTF-8 character at text, 0 if there is none (RFC 3629, section 4). */
-static size_t utf8_length(const unsigned char *text) {
-    size_t length = text[0] < 0x80 ? 1 : text[0] < 0xc2 ? 0 : text[0] < 0xe0 ? 2 : 3;
-    unsigned char low = 0x80, high = 0xbf; /* of the second byte */
-    if (text[0] >= 0xf0)
-        length = text[0] < 0xf5 ? 4 : 0;
-    if (text[0] == 0xe0)
-        low = 0xa0;
-    if (text[0] == 0xed)
-        high = 0x9f; /* surrogates */
-    if (text[0] == 0xf0)
-        low = 0x90;
-    if (text[0] == 0xf4)
-        high = 0x8f;
-    for (size_t i = 1; i < length; i++, low = 0x80, high = 0xbf)
-        if (text[i] < low || text[i] > high)
-            return 0;
-    return length;
-}
-
 /* Text that is no UTF-8 (a file name may be anything) is made so. */
 static void write_string(const char *string, FILE *stream) {
     const unsigned char *text = (const unsigned char *)string;
     putc('"', stream);
     while (*text) {
-        const size_t length = utf8_length(text);
+        const size_t length = ov_utf8_length(text);
         if (length == 0)
             fputs("\\ufffd", stream);
         else if (*text < 0x20)

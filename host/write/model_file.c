@@ -50,6 +50,9 @@ cleanup:
 
 enum { LINE_BYTES = 1 << 16 };
 
+/* All notes take at most so many bytes, and each takes some beside its text. */
+enum { NOTES_BYTES_MAX = 1 << 24, NOTE_ROOM = 48 };
+
 typedef struct reader {
     ovoid_context *context;
     const char *name; /* of the file, for errors */
@@ -60,6 +63,7 @@ typedef struct reader {
     ovoid_model *model; /* notes go here; the rest at the end */
     ovoid_ellipsoid *ellipsoids;
     size_t count, capacity;
+    size_t notes_bytes;
     double decay, isovalue; /* NAN until given */
 } reader;
 
@@ -176,8 +180,13 @@ static ovoid_status read_hash_line(reader *r) {
     bool is_isovalue = strcmp(r->line + key, "isovalue") == 0;
     bool is_note = ov_model_key_valid(r->line + key);
     r->line[colon] = ':';
-    if (is_note)
+    if (is_note) {
+        r->notes_bytes += r->length - key + NOTE_ROOM;
+        if (r->notes_bytes > NOTES_BYTES_MAX)
+            return ov_fail(r->context, OVOID_ERROR_LIMIT, "%s:%llu:1: more than %d bytes of notes",
+                           r->name, (unsigned long long)r->line_number, NOTES_BYTES_MAX);
         return ov_model_add_note(r->context, r->model, r->line + key, r->length - key);
+    }
     if (!is_decay && !is_isovalue)
         return OVOID_OK;
 

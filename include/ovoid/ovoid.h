@@ -205,8 +205,10 @@ typedef struct ovoid_molecule_counts {
 
 /* Reads a molecule; gzip is recognised by content; "-" is standard input. A bad line is
  * OVOID_ERROR_FORMAT with "file:line:column: reason". A file without atoms, or none that is kept,
- * is OVOID_ERROR_EMPTY. Of alternate locations, one conformer of each residue is kept: that of the
- * highest mean occupancy, of equal ones the first. */
+ * is OVOID_ERROR_EMPTY. Memory follows the atoms, not the file, also where gzip makes it small:
+ * what no file has so many of (names in a loop, parts of an assembly) is OVOID_ERROR_LIMIT. Of
+ * alternate locations, one conformer of each residue is kept: that of the highest mean occupancy,
+ * of equal ones the first. */
 OVOID_API ovoid_status ovoid_molecule_read(ovoid_context *context, const char *path,
                                            ovoid_molecule_format format, ovoid_molecule **molecule);
 
@@ -246,7 +248,8 @@ OVOID_API int32_t ovoid_molecule_model(const ovoid_molecule *molecule);
 /* ---- which atom is which -------------------------------------------------------------------- */
 
 /* The structures below are arrays of fixed layout, to be mapped by bindings as they are. Text ends
- * in a zero byte and is filled up with zeros; longer text is cut, with a warning. */
+ * in a zero byte and is filled up with zeros; longer text is cut, with a warning. Control
+ * characters in it are '?'. */
 
 /* A residue number that the file does not give. */
 #define OVOID_NO_NUMBER INT32_MIN

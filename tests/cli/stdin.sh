@@ -22,3 +22,12 @@ expect_files a.xyzr a.pqr pqr.txt a.ovoid b.ovoid pqr.ovoid
 code=$?
 expect_code 3
 expect_files a.xyzr a.pqr pqr.txt a.ovoid b.ovoid pqr.ovoid
+
+# A pipe with a name gives its bytes once: none of them may be lost to a look at what they are.
+mkfifo pipe
+cat a.xyzr >pipe &
+run "$OVOID" mesh pipe -o a.obj
+wait
+rm pipe
+expect_code 0
+expect_files a.xyzr a.pqr pqr.txt a.ovoid b.ovoid pqr.ovoid a.obj

@@ -115,18 +115,11 @@ static size_t points_of(ovoid_context *context, const double *xyzr, size_t atoms
     test_check(context,
                ov_sample(context, xyzr, atoms, options->decay, &lattice, band, sampling, &samples));
     const size_t count = samples.points.count;
-    float *const packed =
-        read_floats(context, &samples.points.xyz, samples.points.packs * 3 * OV_PACK);
-    *xyz = test_alloc(3 * count, sizeof **xyz);
+    assert_int_equal(samples.points.packs, (count + OV_PACK - 1) / OV_PACK);
+    *xyz = read_places(context, &samples.points);
     *target = test_alloc(count, sizeof **target);
-    for (size_t k = 0; k < count; ++k) {
-        for (size_t axis = 0; axis < 3; ++axis)
-            (*xyz)[3 * k + axis] =
-                samples.points.origin[axis] +
-                packed[k / OV_PACK * (3 * OV_PACK) + axis * OV_PACK + k % OV_PACK];
+    for (size_t k = 0; k < count; ++k)
         (*target)[k] = reference_phi(xyzr, atoms, options->decay, *xyz + 3 * k);
-    }
-    free(packed);
     ov_samples_destroy(&samples);
     return count;
 }

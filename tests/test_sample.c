@@ -100,16 +100,16 @@ static size_t expect_samples(ovoid_context *context, const job *j) {
     const ov_points *const points = &samples.points;
     const size_t all = (size_t)(lattice.size[0] * lattice.size[1] * lattice.size[2]);
     bool *const kept = test_alloc(all, sizeof *kept);
-    float *const packed = read_floats(context, &points->xyz, points->packs * 3 * OV_PACK);
+    double *const xyz = read_places(context, points);
     float *const value = read_floats(context, &samples.value, points->packs * OV_PACK);
     float *const slope = read_floats(context, &samples.gradient, points->packs * 3 * OV_PACK);
     double phi;
     reference_sum gradient[3];
-    for (size_t k = 0; k < points->count; ++k) {
+    for (size_t k = 0; k < points->packs * OV_PACK; ++k) {
         const size_t at = k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
-        double y[3];
-        for (size_t axis = 0; axis < 3; ++axis)
-            y[axis] = points->origin[axis] + packed[at + axis * OV_PACK];
+        const double *const y = xyz + 3 * k;
+        if (ov_points_fill(points, k))
+            continue;
         const size_t index = index_of(&lattice, y);
         assert_false(kept[index]);
         kept[index] = true;
@@ -137,7 +137,7 @@ static size_t expect_samples(ovoid_context *context, const job *j) {
     const size_t count = points->count;
     print_message("%zu of %zu lattice points kept, %zu wanted\n", count, all, wanted);
     free(kept);
-    free(packed);
+    free(xyz);
     free(value);
     free(slope);
     ov_samples_destroy(&samples);

@@ -23,10 +23,10 @@ typedef struct writer {
     statistics of;
 } writer;
 
-static void take_values(const double *values, size_t count, void *user) {
+static void take_values(const float *values, size_t count, void *user) {
     writer *w = user;
     for (size_t k = 0; k < count; k++) {
-        const float value = (float)values[k];
+        const float value = values[k];
         w->of.low = fminf(w->of.low, value);
         w->of.high = fmaxf(w->of.high, value);
         w->of.sum += (double)value;

@@ -126,6 +126,7 @@ void bench_place(bench *b, ovoid_context *context, const ov_quadric *quadrics, s
     if (terms_count > 0)
         memcpy(b->quadrics, quadrics, terms_count * sizeof *quadrics);
     test_check(context, ov_points_create(context, xyz, count, origin, 0.5, &b->points));
+    assert_int_equal(b->points.packs, (count + OV_PACK - 1) / OV_PACK); /* none ends early */
     b->xyz = test_alloc(3 * count, sizeof *b->xyz);
     for (size_t k = 0; k < count; ++k)
         memcpy(b->xyz + 3 * k, xyz + 3 * (size_t)b->points.order[k], 3 * sizeof *xyz);

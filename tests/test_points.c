@@ -367,6 +367,23 @@ static void packs_end_at_gaps(void **state) {
     expect_packs(*state, xyz, COUNT, 1.0);
 }
 
+/* The curve is fine enough to keep the packs of dense clusters small, as far apart as they may be.
+ */
+static void clusters_at_both_ends(void **state) {
+    enum { COUNT = 20000 };
+    const double origin[3] = {0.0, 0.0, 0.0};
+    test_random random = {8};
+    double *const xyz = random_places(&random, COUNT, 15.0);
+    ov_points points = {0};
+    for (size_t k = 0; k < 3 * COUNT; ++k)
+        xyz[k] += k / 3 % 2 ? 1e6 : -1e6;
+    test_check(*state, ov_points_create(*state, xyz, COUNT, origin, 1.0, &points));
+    assert_true(points.packs < COUNT / OV_PACK + 10);
+    assert_true(expect_packs(*state, xyz, COUNT, 1.0) < 7.0);
+    ov_points_destroy(&points);
+    free(xyz);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(curve_visits_every_cell_stepping_to_neighbours),
@@ -381,6 +398,7 @@ int main(void) {
         cmocka_unit_test(coincident_points),
         cmocka_unit_test(odd_extents),
         cmocka_unit_test(packs_end_at_gaps),
+        cmocka_unit_test(clusters_at_both_ends),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

@@ -272,15 +272,19 @@ static void exponential_vanishes_below_its_range(void **state) {
     float xyz[3 * COUNT] = {0};
     for (size_t k = 0; k < COUNT; ++k)
         xyz[3 * k] = 9.5f * powf(1.2f, (float)k / 4.0f); /* to 8e4: q to 6e9 */
-    bench b;
-    bench_create(&b, *state, &quadric, 1, xyz, COUNT, 1e-37);
+    const double origin[3] = {0};
+    bench b = {.context = *state};
+    double *const wide = widen_points(xyz, COUNT);
+    test_check(*state, ov_points_create(*state, wide, COUNT, origin, 0.5, &b.points));
+    test_check(*state, ov_terms_set(*state, &b.terms, &quadric, 1, origin, 1e-37));
+    free(wide);
     /* All points in one list, however far: a reach as if there were no cut-off. */
     b.terms.host[0].reach = 1e30f;
     test_check(*state, ov_buffer_write(*state, &b.terms.device, 0, b.terms.host, sizeof(ov_term)));
     test_check(*state, ov_lists_build(*state, &b.lists, &b.points, &b.terms, 0.0));
     assert_int_equal(b.lists.items, b.points.packs);
     float *const got = evaluate(&b, *state);
-    for (size_t k = 0; k < COUNT; ++k)
+    for (size_t k = 0; k < b.points.packs * OV_PACK; ++k)
         assert_true(got[k] >= 0.0f && got[k] <= 1.2e-38f);
     free(got);
     bench_destroy(&b);

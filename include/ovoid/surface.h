@@ -183,8 +183,8 @@ typedef struct ovoid_export_options {
 
 #define OVOID_DEFAULT_MAP_GIGABYTES 1.0
 
-/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue, maps of up to
- * OVOID_DEFAULT_MAP_GIGABYTES. */
+/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue, maps of up
+ * to OVOID_DEFAULT_MAP_GIGABYTES. */
 OVOID_API void ovoid_export_options_init(ovoid_export_options *options);
 
 /* Writes a file for another program, whole or not at all; "-" is standard output and needs a

@@ -206,7 +206,7 @@ static void cut_off_loses_less_than_it_says(void **state) {
     random_ellipsoids(&random, MODEL_RANDOM, 8.0, ellipsoids, terms);
     for (size_t i = 0; i < terms; ++i)
         ov_quadric_of_ellipsoid(&ellipsoids[i], &quadrics[i]);
-    float *const xyz = random_points(&random, count, 10.0);
+    float *const xyz = random_points(&random, count, 7.9);
     bench_create(&b, *state, quadrics, terms, xyz, count, cutoff);
     assert_true(b.lists.items > 0 && b.lists.items < terms * b.points.packs);
     test_check(*state, ov_field(*state, &b.operations, &b.points, &b.terms, &b.lists, &value));

@@ -66,7 +66,8 @@ static void move(test_random *random, motion how, double *x, size_t count) {
  */
 static void lists_follow_moving_ellipsoids(void **state) {
     const size_t terms = test_size(12, 4), count = test_size(2500, 150), steps = test_size(80, 10);
-    const double half[3] = {14.0, 14.0, 14.0};
+    const double side = test_size(140, 79) / 10.0; /* so that no pack ends early */
+    const double half[3] = {side, side, side};
     for (int how = 0; how < MOTIONS; ++how) {
         test_random random = {10 + (uint64_t)how};
         ov_samples samples;

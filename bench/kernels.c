@@ -149,11 +149,11 @@ static double uniform(uint64_t *state) {
 static void make_long_lists(bench *b, setting *s) {
     enum { POINTS = 1 << 16, TERMS = 512 };
     uint64_t state = 1;
-    float *const xyz = need(malloc(3 * POINTS * sizeof *xyz));
+    double *const xyz = need(malloc(3 * POINTS * sizeof *xyz));
     ov_quadric *const quadrics = need(malloc(TERMS * sizeof *quadrics));
     const double origin[3] = {0};
     for (size_t k = 0; k < 3 * POINTS; ++k)
-        xyz[k] = (float)(10.0 * uniform(&state) - 5.0);
+        xyz[k] = 10.0 * uniform(&state) - 5.0;
     for (size_t i = 0; i < TERMS; ++i) {
         const double atom[4] = {10.0 * uniform(&state) - 5.0, 10.0 * uniform(&state) - 5.0,
                                 10.0 * uniform(&state) - 5.0, 1.0 + uniform(&state)};
@@ -169,17 +169,24 @@ static void make_long_lists(bench *b, setting *s) {
     free(quadrics);
 }
 
-/* The packs' coordinates, packs * 3 * OV_PACK floats, to be freed. */
-static float *read_points(bench *b, const ov_points *points) {
-    const size_t bytes = points->packs * 3 * OV_PACK * sizeof(float);
-    float *const xyz = need(malloc(bytes));
-    if (ov_buffer_read(b->context, &points->xyz, 0, xyz, bytes))
+/* Coordinates of the places of the packs, about their common origin: 3 each, to be freed. */
+static double *read_points(bench *b, const ov_points *points) {
+    const size_t places = points->packs * OV_PACK, bytes = 3 * places * sizeof(float);
+    float *const packed = need(malloc(bytes));
+    double *const xyz = need(malloc(3 * places * sizeof *xyz));
+    if (ov_buffer_read(b->context, &points->xyz, 0, packed, bytes))
         fail(b);
+    for (size_t k = 0; k < places; ++k) {
+        ov_points_at(points, packed, k, xyz + 3 * k);
+        for (size_t axis = 0; axis < 3; ++axis)
+            xyz[3 * k + axis] -= points->origin[axis];
+    }
+    free(packed);
     return xyz;
 }
 
 static double count_useful(bench *b, const setting *s) {
-    float *const xyz = read_points(b, &s->points);
+    double *const xyz = read_points(b, &s->points);
     uint32_t *const start = need(malloc((s->lists.packs + 1) * sizeof *start));
     uint32_t *const item = need(malloc((s->lists.items + 1) * sizeof *item));
     if (ov_buffer_read(b->context, &s->lists.pack_start, 0, start,
@@ -190,10 +197,9 @@ static double count_useful(bench *b, const setting *s) {
     for (size_t pack = 0; pack < s->lists.packs; ++pack)
         for (uint32_t k = start[pack]; k < start[pack + 1]; ++k) {
             const ov_term *const t = &s->terms.host[item[k]];
-            const float *const p = xyz + pack * (3 * OV_PACK);
-            for (size_t j = 0; j < OV_PACK && pack * OV_PACK + j < s->points.count; ++j) {
-                const double x = p[j] - t->x, y = p[OV_PACK + j] - t->y,
-                             z = p[2 * OV_PACK + j] - t->z;
+            for (size_t j = 0; j < ov_pack_points(&s->points, pack); ++j) {
+                const double *const p = xyz + 3 * (pack * OV_PACK + j);
+                const double x = p[0] - t->x, y = p[1] - t->y, z = p[2] - t->z;
                 within += t->xx * x * x + t->xy * x * y + t->xz * x * z + t->yy * y * y +
                               t->yz * y * z + t->zz * z * z <=
                           t->reach;

@@ -1,7 +1,8 @@
 /*
  * Sums over the terms that reach a pack, at each of its points (design: operation "field").
  *
- * points: OV_PACK x, then OV_PACK y, then OV_PACK z for each pack, angstrom from the origin.
+ * points: OV_PACK x, then OV_PACK y, then OV_PACK z for each pack, angstrom from the pack's origin.
+ * origins: of each pack, x, y, z, relative to what terms are relative to; w is not used here.
  * start, item: the terms of pack p are item[start[p]] .. item[start[p + 1] - 1].
  * One pack per OV_LANES work-items; every lane runs over the whole list for its own points.
  */
@@ -23,24 +24,33 @@ static inline void ov_load_points(ov_lane_points *lane_points, __global const fl
 
 /* value[k] = sum_i e_i(y_k) */
 __kernel void field(const uint packs, __global const float *restrict points,
-                    __global const uint *restrict start, __global const uint *restrict item,
-                    __global const ov_term *restrict terms, __global float *restrict value) {
+                    __global const float4 *restrict origins, __global const uint *restrict start,
+                    __global const uint *restrict item, __global const ov_term *restrict terms,
+                    __global float *restrict value) {
     const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
     if (pack >= packs)
         return;
     ov_lane_points p;
     ov_load_points(&p, points, pack, lane);
+    const float4 origin = origins[pack];
     ov_vec sum[OV_VECTORS];
 #pragma unroll
     for (uint v = 0; v < OV_VECTORS; ++v)
         sum[v] = 0.0f;
 
     const uint end = start[pack + 1];
-    for (uint k = start[pack]; k < end; ++k) {
-        const ov_term t = terms[item[k]];
+    for (uint first = start[pack]; first < end; first += OV_CENTRES) {
+        const uint some = min((uint)OV_CENTRES, end - first);
+        float centre[4 * OV_CENTRES];
+        for (uint k = 0; k < some; ++k)
+            vstore4(ov_centre(terms + item[first + k], origin), k, centre);
+        for (uint k = 0; k < some; ++k) {
+            const ov_term t = terms[item[first + k]];
 #pragma unroll
-        for (uint v = 0; v < OV_VECTORS; ++v)
-            sum[v] += ov_value(t, p.x[v] - t.x, p.y[v] - t.y, p.z[v] - t.z);
+            for (uint v = 0; v < OV_VECTORS; ++v)
+                sum[v] += ov_value(t, p.x[v] - centre[4 * k], p.y[v] - centre[4 * k + 1],
+                                   p.z[v] - centre[4 * k + 2]);
+        }
     }
 #pragma unroll
     for (uint v = 0; v < OV_VECTORS; ++v)
@@ -52,34 +62,43 @@ __kernel void field(const uint packs, __global const float *restrict points,
  * derivatives along a direction v of the parameters this is J v, and W J v with weights. */
 __kernel void
 field_polynomial(const uint packs, __global const float *restrict points,
-                 __global const uint *restrict start, __global const uint *restrict item,
-                 __global const ov_term *restrict terms, __global const float *restrict polynomial,
-                 __global const float *restrict weight, __global float *restrict value) {
+                 __global const float4 *restrict origins, __global const uint *restrict start,
+                 __global const uint *restrict item, __global const ov_term *restrict terms,
+                 __global const float *restrict polynomial, __global const float *restrict weight,
+                 __global float *restrict value) {
     const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
     if (pack >= packs)
         return;
     ov_lane_points p;
     ov_load_points(&p, points, pack, lane);
+    const float4 origin = origins[pack];
     ov_vec sum[OV_VECTORS];
 #pragma unroll
     for (uint v = 0; v < OV_VECTORS; ++v)
         sum[v] = 0.0f;
 
     const uint end = start[pack + 1];
-    for (uint k = start[pack]; k < end; ++k) {
-        const ov_term t = terms[item[k]];
-        __global const float *const c = polynomial + (size_t)item[k] * OV_MONOMIALS;
-        const float c0 = c[0], c1 = c[1], c2 = c[2], c3 = c[3], c4 = c[4], c5 = c[5], c6 = c[6],
-                    c7 = c[7], c8 = c[8], c9 = c[9];
+    for (uint first = start[pack]; first < end; first += OV_CENTRES) {
+        const uint some = min((uint)OV_CENTRES, end - first);
+        float centre[4 * OV_CENTRES];
+        for (uint k = 0; k < some; ++k)
+            vstore4(ov_centre(terms + item[first + k], origin), k, centre);
+        for (uint k = 0; k < some; ++k) {
+            const ov_term t = terms[item[first + k]];
+            __global const float *const c = polynomial + (size_t)item[first + k] * OV_MONOMIALS;
+            const float c0 = c[0], c1 = c[1], c2 = c[2], c3 = c[3], c4 = c[4], c5 = c[5], c6 = c[6],
+                        c7 = c[7], c8 = c[8], c9 = c[9];
 #pragma unroll
-        for (uint v = 0; v < OV_VECTORS; ++v) {
-            const ov_vec x = p.x[v] - t.x, y = p.y[v] - t.y, z = p.z[v] - t.z;
-            const ov_vec in_x =
-                fma(z, (ov_vec)(c6), fma(y, (ov_vec)(c5), fma(x, (ov_vec)(c4), (ov_vec)(c1))));
-            const ov_vec in_y = fma(z, (ov_vec)(c8), fma(y, (ov_vec)(c7), (ov_vec)(c2)));
-            const ov_vec in_z = fma(z, (ov_vec)(c9), (ov_vec)(c3));
-            const ov_vec factor = fma(x, in_x, fma(y, in_y, fma(z, in_z, (ov_vec)(c0))));
-            sum[v] = fma(ov_value(t, x, y, z), factor, sum[v]);
+            for (uint v = 0; v < OV_VECTORS; ++v) {
+                const ov_vec x = p.x[v] - centre[4 * k], y = p.y[v] - centre[4 * k + 1],
+                             z = p.z[v] - centre[4 * k + 2];
+                const ov_vec in_x =
+                    fma(z, (ov_vec)(c6), fma(y, (ov_vec)(c5), fma(x, (ov_vec)(c4), (ov_vec)(c1))));
+                const ov_vec in_y = fma(z, (ov_vec)(c8), fma(y, (ov_vec)(c7), (ov_vec)(c2)));
+                const ov_vec in_z = fma(z, (ov_vec)(c9), (ov_vec)(c3));
+                const ov_vec factor = fma(x, in_x, fma(y, in_y, fma(z, in_z, (ov_vec)(c0))));
+                sum[v] = fma(ov_value(t, x, y, z), factor, sum[v]);
+            }
         }
     }
 #pragma unroll
@@ -94,6 +113,7 @@ field_polynomial(const uint packs, __global const float *restrict points,
 /* value[k] = sum_i e_i(y_k), and its gradient in angstrom^-1: OV_PACK x, y, z components per pack,
  * as the points are stored. */
 __kernel void field_gradient(const uint packs, __global const float *restrict points,
+                             __global const float4 *restrict origins,
                              __global const uint *restrict start,
                              __global const uint *restrict item,
                              __global const ov_term *restrict terms, __global float *restrict value,
@@ -103,6 +123,7 @@ __kernel void field_gradient(const uint packs, __global const float *restrict po
         return;
     ov_lane_points p;
     ov_load_points(&p, points, pack, lane);
+    const float4 origin = origins[pack];
     __global float *const out = gradient + (size_t)pack * (3 * OV_PACK);
 #pragma unroll
     for (uint v = 0; v < OV_VECTORS; ++v) {
@@ -110,7 +131,8 @@ __kernel void field_gradient(const uint packs, __global const float *restrict po
         const uint end = start[pack + 1];
         for (uint k = start[pack]; k < end; ++k) {
             const ov_term t = terms[item[k]];
-            const ov_vec x = p.x[v] - t.x, y = p.y[v] - t.y, z = p.z[v] - t.z;
+            const float4 centre = ov_centre(terms + item[k], origin);
+            const ov_vec x = p.x[v] - centre.x, y = p.y[v] - centre.y, z = p.z[v] - centre.z;
             const ov_vec e = ov_value(t, x, y, z);
             sum += e;
             /* de/dx = -ln 2 e dq/dx, the factor left for the end */

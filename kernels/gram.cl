@@ -5,6 +5,7 @@
  * term's diagonal block of J^T W J.
  *
  * start, item: the packs of term i are item[start[i]] .. item[start[i + 1] - 1].
+ * points, origins: as for field().
  * weight: OV_PACK per pack, 0 for points that only fill up the last pack.
  * result: OV_GRAM floats per term. Sums of tiles are added up in floats, and those of
  * OV_FLUSH_TILES tiles to a two-float total: about one rounding of the sum of magnitudes, however
@@ -37,12 +38,12 @@ typedef struct ov_offset {
 } ov_offset;
 
 static inline ov_offset ov_offset_of(__global const float *points, size_t pack, uint at,
-                                     const ov_term t) {
+                                     const float *centre) {
     __global const float *const p = points + pack * (3 * OV_PACK);
     ov_offset o;
-    o.x = OV_LOAD(at, p) - t.x;
-    o.y = OV_LOAD(at, p + OV_PACK) - t.y;
-    o.z = OV_LOAD(at, p + 2 * OV_PACK) - t.z;
+    o.x = OV_LOAD(at, p) - centre[0];
+    o.y = OV_LOAD(at, p + OV_PACK) - centre[1];
+    o.z = OV_LOAD(at, p + 2 * OV_PACK) - centre[2];
     return o;
 }
 
@@ -109,7 +110,8 @@ static inline void ov_add_quartic(ov_vec *sum, ov_vec e, const ov_offset o) {
             const size_t pack = item[begin + k];                                                   \
             _Pragma("unroll") for (uint v = 0; v < OV_VECTORS; ++v) {                              \
                 const uint at = v * OV_LANES + lane;                                               \
-                add(part, tile[n * OV_VECTORS + v], ov_offset_of(points, pack, at, t));            \
+                add(part, tile[n * OV_VECTORS + v],                                                \
+                    ov_offset_of(points, pack, at, centre + 4 * n));                               \
             }                                                                                      \
         }                                                                                          \
         _Pragma("unroll") for (uint m = 0; m < (sums); ++m) sum[(first) + m] += part[m];           \
@@ -134,9 +136,9 @@ static inline float ov_sum(ov_vec value) {
 }
 
 __kernel void gram(const uint count, __global const float *restrict points,
-                   __global const float *restrict weight, __global const uint *restrict start,
-                   __global const uint *restrict item, __global const ov_term *restrict terms,
-                   __global float *restrict result) {
+                   __global const float4 *restrict origins, __global const float *restrict weight,
+                   __global const uint *restrict start, __global const uint *restrict item,
+                   __global const ov_term *restrict terms, __global float *restrict result) {
     const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
     const uint lane = sharer % OV_LANES;
 #if OV_SHARERS == 1
@@ -160,12 +162,15 @@ __kernel void gram(const uint count, __global const float *restrict points,
         for (uint begin = first; begin < stop; begin += OV_TILE_PACKS) {
             const uint packs = min((uint)OV_TILE_PACKS, stop - begin);
             ov_vec tile[OV_TILE];
+            float centre[4 * OV_TILE_PACKS / OV_PACKS_AT_ONCE];
+            for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n)
+                vstore4(ov_centre(terms + index, origins[item[begin + k]]), n, centre);
             for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n) {
                 const size_t pack = item[begin + k];
 #pragma unroll
                 for (uint v = 0; v < OV_VECTORS; ++v) {
                     const uint at = v * OV_LANES + lane;
-                    const ov_offset o = ov_offset_of(points, pack, at, t);
+                    const ov_offset o = ov_offset_of(points, pack, at, centre + 4 * n);
                     const ov_vec e = ov_value(t, o.x, o.y, o.z);
                     tile[n * OV_VECTORS + v] = OV_LOAD(at, weight + pack * OV_PACK) * e * e;
                 }

@@ -25,6 +25,9 @@ kernel void layout(global uint *out) {
     out[n++] = OFFSET(term, yy);
     out[n++] = OFFSET(term, yz);
     out[n++] = OFFSET(term, zz);
+    out[n++] = OFFSET(term, rest_x);
+    out[n++] = OFFSET(term, rest_y);
+    out[n++] = OFFSET(term, rest_z);
     out[n++] = OFFSET(term, reach);
     out[n++] = OFFSET(term, skin);
     out[n++] = sizeof(ov_tree);

@@ -4,6 +4,7 @@
  * over the points of the packs that i or j reaches.
  *
  * pairs: i, j for each pair; merged: its m; value: phi~ of all terms together.
+ * points, origins: as for field().
  * start, item: the packs of term i are item[start[i]] .. item[start[i + 1] - 1], ascending, so that
  * one walk along both lists meets each pack once.
  * On CPUs one work-item per pair, elsewhere a group of OV_LANES.
@@ -14,8 +15,8 @@ static inline ov_vec squared_residual(ov_vec v, ov_vec low, ov_vec high) {
     return r * r;
 }
 
-static inline ov_vec value_at(const ov_term t, ov_vec x, ov_vec y, ov_vec z) {
-    return ov_value(t, x - t.x, y - t.y, z - t.z);
+static inline ov_vec value_at(const ov_term t, const float4 centre, ov_vec x, ov_vec y, ov_vec z) {
+    return ov_value(t, x - centre.x, y - centre.y, z - centre.z);
 }
 
 static inline float sum_of(ov_vec value) {
@@ -33,6 +34,7 @@ static inline float sum_of(ov_vec value) {
 __kernel void merge_loss(const uint count, __global const uint *restrict pairs,
                          __global const ov_term *restrict merged,
                          __global const float *restrict points,
+                         __global const float4 *restrict origins,
                          __global const float *restrict value, __global const float *restrict low,
                          __global const float *restrict high, __global const float *restrict weight,
                          __global const uint *restrict start, __global const uint *restrict item,
@@ -55,14 +57,17 @@ __kernel void merge_loss(const uint count, __global const uint *restrict pairs,
         at_j += next_j == pack;
         __global const float *const p = points + pack * (3 * OV_PACK);
         const size_t first = pack * OV_PACK;
+        const float4 origin = origins[pack];
+        const float4 ci = ov_centre(terms + i, origin), cj = ov_centre(terms + j, origin),
+                     cm = ov_centre(merged + pair, origin);
 #pragma unroll
         for (uint n = 0; n < OV_VECTORS; ++n) {
             const uint at = n * OV_LANES + lane;
             const ov_vec x = OV_LOAD(at, p), y = OV_LOAD(at, p + OV_PACK),
                          z = OV_LOAD(at, p + 2 * OV_PACK), v = OV_LOAD(at, value + first),
                          l = OV_LOAD(at, low + first), h = OV_LOAD(at, high + first);
-            const ov_vec without = v - value_at(ti, x, y, z) - value_at(tj, x, y, z);
-            const ov_vec after = squared_residual(without + value_at(tm, x, y, z), l, h);
+            const ov_vec without = v - value_at(ti, ci, x, y, z) - value_at(tj, cj, x, y, z);
+            const ov_vec after = squared_residual(without + value_at(tm, cm, x, y, z), l, h);
             sum = fma(OV_LOAD(at, weight + first), after - squared_residual(v, l, h), sum);
         }
     }

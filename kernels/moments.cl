@@ -3,6 +3,7 @@
  * sum_k u_k e_i(y_k) m(y_k - mu_i), m the OV_MONOMIALS monomials of shared.h.
  *
  * start, item: the packs of term i are item[start[i]] .. item[start[i + 1] - 1].
+ * points, origins: as for field().
  * u: weights of the points, OV_PACK per pack, 0 for points that only fill up the last pack.
  * moments: OV_MONOMIALS pairs (high, low) per term; the sum is high + low. Floats are summed over a
  * few thousand points and then added to a two-float total, so no device needs double precision.
@@ -91,9 +92,9 @@ static inline void ov_add_team(float *high, float *low, uint lane, __local float
 #endif
 
 __kernel void moments(const uint count, __global const float *restrict points,
-                      __global const float *restrict u, __global const uint *restrict start,
-                      __global const uint *restrict item, __global const ov_term *restrict terms,
-                      __global float *restrict result) {
+                      __global const float4 *restrict origins, __global const float *restrict u,
+                      __global const uint *restrict start, __global const uint *restrict item,
+                      __global const ov_term *restrict terms, __global float *restrict result) {
     const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
     const uint lane = sharer % OV_LANES;
 #if OV_SHARERS == 1
@@ -112,14 +113,18 @@ __kernel void moments(const uint count, __global const float *restrict points,
     for (uint first = start[index]; first < end; first += OV_TILE_PACKS) {
         const uint packs = min((uint)OV_TILE_PACKS, end - first);
         ov_vec ue[OV_TILE];
+        float centre[4 * OV_TILE_PACKS / OV_PACKS_AT_ONCE];
+        for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n)
+            vstore4(ov_centre(terms + index, origins[item[first + k]]), n, centre);
         for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n) {
             const size_t pack = item[first + k];
             __global const float *const p = points + pack * (3 * OV_PACK);
 #pragma unroll
             for (uint v = 0; v < OV_VECTORS; ++v) {
                 const uint at = v * OV_LANES + lane;
-                const ov_vec x = OV_LOAD(at, p) - t.x, y = OV_LOAD(at, p + OV_PACK) - t.y,
-                             z = OV_LOAD(at, p + 2 * OV_PACK) - t.z;
+                const ov_vec x = OV_LOAD(at, p) - centre[4 * n],
+                             y = OV_LOAD(at, p + OV_PACK) - centre[4 * n + 1],
+                             z = OV_LOAD(at, p + 2 * OV_PACK) - centre[4 * n + 2];
                 ue[n * OV_VECTORS + v] = OV_LOAD(at, u + pack * OV_PACK) * ov_value(t, x, y, z);
             }
         }
@@ -129,8 +134,9 @@ __kernel void moments(const uint count, __global const float *restrict points,
 #pragma unroll
             for (uint v = 0; v < OV_VECTORS; ++v) {
                 const uint at = v * OV_LANES + lane;
-                const ov_vec x = OV_LOAD(at, p) - t.x, y = OV_LOAD(at, p + OV_PACK) - t.y,
-                             z = OV_LOAD(at, p + 2 * OV_PACK) - t.z;
+                const ov_vec x = OV_LOAD(at, p) - centre[4 * n],
+                             y = OV_LOAD(at, p + OV_PACK) - centre[4 * n + 1],
+                             z = OV_LOAD(at, p + 2 * OV_PACK) - centre[4 * n + 2];
                 const ov_vec e = ue[n * OV_VECTORS + v];
                 const ov_vec ex = e * x, ey = e * y, ez = e * z;
                 sum[0] += e;

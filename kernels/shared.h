@@ -8,10 +8,12 @@
 #ifdef __OPENCL_C_VERSION__
 typedef uint ov_u32;
 typedef float ov_f32;
+#define OV_ALIGNED(bytes) __attribute__((aligned(bytes)))
 #else
 #include <stdint.h>
 typedef uint32_t ov_u32;
 typedef float ov_f32;
+#define OV_ALIGNED(bytes) /* what malloc() gives is enough */
 #endif
 
 /* Points in a pack: one float16 on a CPU, half a warp on a GPU. Measured on long lists and on real
@@ -46,14 +48,18 @@ typedef float ov_f32;
 #define OV_TRIANGLE 18
 
 /* One ellipsoid as the kernels see it: 2^(log2_amplitude - q(z)), q(z) = z^T A z with A already
- * multiplied by log2(e). Coordinates are relative to the points' origin, in angstrom. */
+ * multiplied by log2(e). Coordinates are relative to the points' origin, in angstrom. A float of
+ * them is too coarse far from that origin, so the centre is a float and what that float leaves: see
+ * ov_from_pack(). 64 bytes, a line of most caches. */
 typedef struct ov_term {
+    ov_f32 x, y, z; /* centre, to the nearest float */
     ov_f32 log2_amplitude;
-    ov_f32 x, y, z;                /* centre */
+    ov_f32 rest_x, rest_y, rest_z; /* of the centre */
+    ov_f32 padding;
     ov_f32 xx, xy, xz, yy, yz, zz; /* A, off-diagonals doubled: q = xx x^2 + xy x y + ... */
     ov_f32 reach;                  /* largest q within the cut-off; negative: reaches nothing */
     ov_f32 skin;                   /* angstrom by which lists let it move, beyond their own skin */
-} ov_term;
+} OV_ALIGNED(16) ov_term;
 
 /* A tree of boxes over consecutive leaves: level 0 holds the leaves, each level above one box per
  * group of OV_GROUP below. Boxes are stored by group as OV_GROUP values each of low x, low y, low

@@ -69,13 +69,14 @@ void scene_create(scene *s, ovoid_context *context, const ov_quadric *quadrics, 
     float *const xyz = choose_points(s, spacing, reach, &s->points);
     assert_true(s->points > 0);
     ov_points *const points = &s->samples.points;
-    test_check(context, ov_points_create(context, xyz, s->points, origin, spacing, points));
+    double *const wide = widen_points(xyz, s->points);
+    test_check(context, ov_points_create(context, wide, s->points, origin, spacing, points));
+    free(wide);
     s->all = points->packs * OV_PACK;
     s->xyz = test_alloc(3 * s->all, sizeof *s->xyz);
     for (size_t k = 0; k < s->all; ++k)
         for (size_t axis = 0; axis < 3; ++axis)
-            s->xyz[3 * k + axis] =
-                xyz[3 * (size_t)points->order[k < s->points ? k : s->points - 1] + axis];
+            s->xyz[3 * k + axis] = xyz[3 * (size_t)points->order[k] + axis];
     evaluate_field(s);
     test_check(context,
                ov_target_create(context, &s->samples, decay, isovalue, options, &s->target));

@@ -108,8 +108,15 @@ void random_ellipsoids(test_random *random, model_kind kind, double half,
 
 /* ---- a model on the device ---------------------------------------------------------------- */
 
-void bench_create(bench *b, ovoid_context *context, const ov_quadric *quadrics, size_t terms_count,
-                  const float *xyz, size_t count, double cutoff) {
+double *widen_points(const float *xyz, size_t count) {
+    double *const wide = test_alloc(3 * count, sizeof *wide);
+    for (size_t k = 0; k < 3 * count; ++k)
+        wide[k] = xyz[k];
+    return wide;
+}
+
+void bench_place(bench *b, ovoid_context *context, const ov_quadric *quadrics, size_t terms_count,
+                 const double *xyz, size_t count, double cutoff) {
     const double origin[3] = {0};
     memset(b, 0, sizeof *b);
     b->context = context;
@@ -119,12 +126,19 @@ void bench_create(bench *b, ovoid_context *context, const ov_quadric *quadrics, 
     if (terms_count > 0)
         memcpy(b->quadrics, quadrics, terms_count * sizeof *quadrics);
     test_check(context, ov_points_create(context, xyz, count, origin, 0.5, &b->points));
+    assert_int_equal(b->points.packs, (count + OV_PACK - 1) / OV_PACK); /* none ends early */
     b->xyz = test_alloc(3 * count, sizeof *b->xyz);
     for (size_t k = 0; k < count; ++k)
-        for (size_t axis = 0; axis < 3; ++axis)
-            b->xyz[3 * k + axis] = xyz[3 * (size_t)b->points.order[k] + axis];
+        memcpy(b->xyz + 3 * k, xyz + 3 * (size_t)b->points.order[k], 3 * sizeof *xyz);
     test_check(context, ov_terms_set(context, &b->terms, quadrics, terms_count, origin, cutoff));
     test_check(context, ov_lists_build(context, &b->lists, &b->points, &b->terms, 0.0));
+}
+
+void bench_create(bench *b, ovoid_context *context, const ov_quadric *quadrics, size_t terms_count,
+                  const float *xyz, size_t count, double cutoff) {
+    double *const wide = widen_points(xyz, count);
+    bench_place(b, context, quadrics, terms_count, wide, count, cutoff);
+    free(wide);
 }
 
 void bench_destroy(bench *b) {
@@ -144,25 +158,50 @@ float *random_points(test_random *random, size_t count, double half) {
     return xyz;
 }
 
-void bench_random(bench *b, ovoid_context *context, model_kind kind, size_t terms_count,
-                  size_t count, uint64_t seed) {
+const double bench_far[3] = {-987654.3217, 523.456789, 12345.6789012};
+
+void bench_random_at(bench *b, ovoid_context *context, model_kind kind, size_t terms_count,
+                     size_t count, uint64_t seed, const double offset[3]) {
     test_random random = {seed};
     ovoid_ellipsoid *const ellipsoids = test_alloc(terms_count, sizeof *ellipsoids);
     ov_quadric *const quadrics = test_alloc(terms_count, sizeof *quadrics);
     random_ellipsoids(&random, kind, 4.0, ellipsoids, terms_count);
-    for (size_t i = 0; i < terms_count; ++i)
+    for (size_t i = 0; i < terms_count; ++i) {
+        for (int axis = 0; axis < 3; ++axis)
+            ellipsoids[i].centre[axis] += offset[axis];
         ov_quadric_of_ellipsoid(&ellipsoids[i], &quadrics[i]);
+    }
     float *const xyz = random_points(&random, count, 6.0);
-    bench_create(b, context, quadrics, terms_count, xyz, count, 1e-37);
+    double *const wide = widen_points(xyz, count);
+    for (size_t k = 0; k < 3 * count; ++k)
+        wide[k] += offset[k % 3];
+    bench_place(b, context, quadrics, terms_count, wide, count, 1e-37);
+    free(wide);
     free(xyz);
     free(quadrics);
     free(ellipsoids);
+}
+
+void bench_random(bench *b, ovoid_context *context, model_kind kind, size_t terms_count,
+                  size_t count, uint64_t seed) {
+    const double offset[3] = {0};
+    bench_random_at(b, context, kind, terms_count, count, seed, offset);
 }
 
 float *read_floats(ovoid_context *context, const ov_buffer *buffer, size_t count) {
     float *const values = test_alloc(count, sizeof *values);
     test_check(context, ov_buffer_read(context, buffer, 0, values, count * sizeof *values));
     return values;
+}
+
+double *read_places(ovoid_context *context, const ov_points *points) {
+    const size_t all = points->packs * OV_PACK;
+    float *const packed = read_floats(context, &points->xyz, 3 * all);
+    double *const xyz = test_alloc(3 * all, sizeof *xyz);
+    for (size_t k = 0; k < all; ++k)
+        ov_points_at(points, packed, k, xyz + 3 * k);
+    free(packed);
+    return xyz;
 }
 
 uint32_t *read_indices(ovoid_context *context, const ov_buffer *buffer, size_t count) {

@@ -94,7 +94,13 @@ typedef struct bench {
 /* Puts `count` points (3 floats each) and the terms on the device, lists included; origin 0. */
 void bench_create(bench *b, ovoid_context *context, const ov_quadric *quadrics, size_t terms_count,
                   const float *xyz, size_t count, double cutoff);
+/* As bench_create(), for points in double. */
+void bench_place(bench *b, ovoid_context *context, const ov_quadric *quadrics, size_t terms_count,
+                 const double *xyz, size_t count, double cutoff);
 void bench_destroy(bench *b);
+
+/* As doubles, 3 per point, to be freed. */
+double *widen_points(const float *xyz, size_t count);
 
 /* Random points in the cube of this half-length. */
 float *random_points(test_random *random, size_t count, double half);
@@ -104,8 +110,17 @@ float *random_points(test_random *random, size_t count, double half);
 void bench_random(bench *b, ovoid_context *context, model_kind kind, size_t terms_count,
                   size_t count, uint64_t seed);
 
+/* As bench_random(), with all moved by this far from the origin (angstrom). */
+void bench_random_at(bench *b, ovoid_context *context, model_kind kind, size_t terms_count,
+                     size_t count, uint64_t seed, const double offset[3]);
+
+/* Offsets as far as coordinates go, and none that floats hold. */
+extern const double bench_far[3];
+
 /* The first `count` floats of a buffer, to be freed. */
 float *read_floats(ovoid_context *context, const ov_buffer *buffer, size_t count);
+/* Coordinates (angstrom) of every place of the packs, 3 each, to be freed. */
+double *read_places(ovoid_context *context, const ov_points *points);
 uint32_t *read_indices(ovoid_context *context, const ov_buffer *buffer, size_t count);
 void write_floats(ovoid_context *context, ov_buffer *buffer, const float *values, size_t count);
 

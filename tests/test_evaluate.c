@@ -212,6 +212,204 @@ static void huge_radius_is_refused(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* ---- large structures --------------------------------------------------------------------- */
+
+enum { CORNERS = 8, MEMBERS = 12, WIDE = CORNERS * MEMBERS };
+
+static const double half_extents[] = {50.0, 200.0, 800.0, 1e4, 1e5, 1e6};
+enum { EXTENTS = sizeof half_extents / sizeof *half_extents };
+
+/* Atoms in eight clusters at the corners of a cube, or one by one all over it, and points near them
+ * in no order. */
+static void place_wide(double half, bool spread, double *xyzr, double *xyz, size_t count) {
+    test_random random = {7};
+    const double side = spread ? half : 4.0;
+    for (size_t i = 0; i < WIDE; ++i) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const double sign = i / MEMBERS >> axis & 1 ? 1.0 : -1.0;
+            xyzr[4 * i + axis] =
+                (spread ? 0.0 : sign * (half - side)) + random_uniform(&random, -side, side);
+        }
+        xyzr[4 * i + 3] = random_uniform(&random, 1.0, 2.0);
+    }
+    for (size_t k = 0; k < count; ++k)
+        for (size_t axis = 0; axis < 3; ++axis)
+            xyz[3 * k + axis] =
+                xyzr[4 * (k * 29 % WIDE) + axis] + random_uniform(&random, -2.5, 2.5);
+}
+
+/* phi and its gradient by the formula. */
+static double exact_field(const double *xyzr, size_t atoms, double d, const double at[3],
+                          double gradient[3]) {
+    double sum = 0.0;
+    memset(gradient, 0, 3 * sizeof *gradient);
+    for (size_t i = 0; i < atoms; ++i) {
+        const double *const a = xyzr + 4 * i;
+        const double one = reference_phi(a, 1, d, at);
+        sum += one;
+        for (int axis = 0; axis < 3; ++axis)
+            gradient[axis] -= 2.0 * d * (at[axis] - a[axis]) * one;
+    }
+    return sum;
+}
+
+static void expect_field(const double *xyzr, size_t atoms, double d, const double *xyz,
+                         size_t count, const double *value, const double *gradient) {
+    double worst = 0.0, worst_slope = 0.0;
+    for (size_t k = 0; k < count; ++k) {
+        double wanted[3], off = 0.0, length = 0.0;
+        const double phi = exact_field(xyzr, atoms, d, xyz + 3 * k, wanted);
+        if (phi < 0.1)
+            continue;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            off += pow(gradient[3 * k + axis] - wanted[axis], 2.0);
+            length += wanted[axis] * wanted[axis];
+        }
+        worst = fmax(worst, fabs(value[k] - phi) / phi);
+        worst_slope = fmax(worst_slope, sqrt(off) / fmax(sqrt(length), phi));
+    }
+    print_message("largest relative errors %.2g, gradient %.2g\n", worst, worst_slope);
+    assert_true(worst < 2.5e-6 && worst_slope < 6e-6);
+}
+
+/* The relative error that the header states, however far a structure extends. */
+static void error_is_the_same_at_every_extent(void **state) {
+    const size_t count = test_size(4000, 200);
+    double *const xyzr = test_alloc(4 * WIDE, sizeof *xyzr), *const xyz =
+                                                                 test_alloc(3 * count, sizeof *xyz);
+    double *const value = test_alloc(count, sizeof *value), *const gradient = test_alloc(
+                                                                3 * count, sizeof *gradient);
+    for (int n = 0; n < 2 * EXTENTS; ++n) {
+        ovoid_molecule *molecule = NULL;
+        place_wide(half_extents[n / 2], n % 2, xyzr, xyz, count);
+        test_check(*state, ovoid_molecule_create(*state, xyzr, WIDE, &molecule));
+        test_check(*state,
+                   ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
+        print_message("half extent %g, %s: ", half_extents[n / 2], n % 2 ? "spread" : "clusters");
+        expect_field(xyzr, WIDE, 0.5, xyz, count, value, gradient);
+        ovoid_molecule_destroy(&molecule);
+    }
+    free(xyzr);
+    free(xyz);
+    free(value);
+    free(gradient);
+}
+
+/* Likewise of a model, in which every ellipsoid is an atom's sphere. */
+static void error_of_a_wide_model(void **state) {
+    const size_t count = test_size(4000, 200);
+    double xyzr[4 * WIDE];
+    ovoid_ellipsoid ellipsoids[WIDE] = {{0}};
+    ovoid_model *model = NULL;
+    double *const xyz = test_alloc(3 * count, sizeof *xyz),
+                  *const value = test_alloc(count, sizeof *value),
+                  *const gradient = test_alloc(3 * count, sizeof *gradient);
+    place_wide(1e6, false, xyzr, xyz, count);
+    for (size_t i = 0; i < WIDE; ++i) {
+        ellipsoids[i].amplitude = exp(0.5 * xyzr[4 * i + 3] * xyzr[4 * i + 3]);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            ellipsoids[i].decay[axis] = 0.5;
+            ellipsoids[i].centre[axis] = xyzr[4 * i + axis];
+            ellipsoids[i].angle[axis] = (double)i;
+        }
+    }
+    test_check(*state, ovoid_model_create(*state, ellipsoids, WIDE, 0.5, 1.0, &model));
+    test_check(*state, ovoid_model_field(*state, model, xyz, count, value, gradient));
+    expect_field(xyzr, WIDE, 0.5, xyz, count, value, gradient);
+    ovoid_model_destroy(&model);
+    free(xyz);
+    free(value);
+    free(gradient);
+}
+
+/* However far out a point is, its value and gradient are 0, and those of its neighbours right: by
+ * themselves, and among points that are near. */
+static void points_far_outside(void **state) {
+    static const double out[] = {1e3,  1e5,  1e6,  1e7,   1e12,  1e19,
+                                 1e20, 3e38, 4e38, 1e100, 1e300, DBL_MAX};
+    enum { OUT = sizeof out / sizeof *out };
+    double xyzr[4 * ATOMS], value[4], gradient[12], single[4];
+    const double near[3] = {101.0, 99.0, 100.0};
+    ovoid_molecule *molecule = random_molecule(*state, xyzr);
+    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, near, 1, single, single + 1));
+    assert_true(single[0] > 0.1);
+    for (int n = 0; n < 2 * OUT * 3; ++n) {
+        const double far = n % 2 ? out[n / 6] : -out[n / 6];
+        double xyz[12] = {far, far, far, 0.0, 0.0, 0.0, 100.0, 100.0, 100.0};
+        xyz[3 + n / 2 % 3] = far;
+        xyz[6 + n / 2 % 3] = far;
+        memcpy(xyz + 9, near, sizeof near);
+        for (size_t count = 3; count <= 4; ++count) {
+            memset(value, 0xff, sizeof value);
+            memset(gradient, 0xff, sizeof gradient);
+            test_check(*state,
+                       ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
+            for (int k = 0; k < 3; ++k) {
+                assert_true(value[k] == 0.0);
+                for (int axis = 0; axis < 3; ++axis)
+                    assert_true(gradient[3 * k + axis] == 0.0);
+            }
+            if (count == 4)
+                expect_near(value[3], single[0], 1e-6 * single[0], "phi of the neighbour");
+            for (int axis = 0; axis < 3 && count == 4; ++axis)
+                expect_near(gradient[9 + axis], single[1 + axis], 1e-5, "its gradient");
+        }
+    }
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* A model as long as a float is wide: far points that it does reach, and some that it does not. */
+static void model_that_reaches_far(void **state) {
+    const ovoid_ellipsoid ellipsoid = {.amplitude = 2.0,
+                                       .decay = {1e-10, 1.0, 2.0},
+                                       .centre = {5e4, 0.0, 0.0},
+                                       .angle = {0.3, 0.0, 0.0}};
+    const double xyz[] = {1e5, 0.1, -0.1, 1.5e5, 0.2, 0.3, 1e12, 0.0, 0.0, 1e300, 0.0, 0.0};
+    double value[4], gradient[12];
+    ovoid_model *model = NULL;
+    test_check(*state, ovoid_model_create(*state, &ellipsoid, 1, 0.5, 1.0, &model));
+    test_check(*state, ovoid_model_field(*state, model, xyz, 4, value, gradient));
+    for (int k = 0; k < 2; ++k) {
+        const double wanted = reference_ellipsoid(&ellipsoid, xyz + 3 * k);
+        expect_near(value[k], wanted, 2e-6 * wanted, "phi~");
+    }
+    for (int k = 6; k < 12; ++k)
+        assert_true(value[k / 3] == 0.0 && gradient[k] == 0.0);
+    ovoid_model_destroy(&model);
+}
+
+/* Nothing is written when a later piece fails, although the first went well. */
+static void failure_leaves_the_outputs(void **state) {
+    const size_t outside = (size_t)1 << 20, inside = 20000, count = outside + inside;
+    double xyzr[4 * ATOMS];
+    ovoid_context *context = NULL;
+    ov_device *device = NULL;
+    if (test_small())
+        skip();
+    (void)state;
+    assert_int_equal(ovoid_context_create(&context), OVOID_OK);
+    test_check(context, ovoid_context_open_device(context, NULL));
+    test_check(context, ov_device_get(context, &device));
+    ovoid_molecule *molecule = random_molecule(context, xyzr);
+    double *const xyz = test_alloc(3 * count, sizeof *xyz), *const near = random_positions(inside);
+    double *const value = test_alloc(count, sizeof *value), *const gradient = test_alloc(
+                                                                3 * count, sizeof *gradient);
+    memcpy(xyz + 3 * outside, near, 3 * inside * sizeof *xyz);
+    for (size_t k = 0; k < 4 * count; ++k)
+        *(k < count ? value + k : gradient + k - count) = -7.0;
+    device->info.max_allocation = 3 * inside * sizeof(float) - 1; /* not enough for the points */
+    test_refused(context, ovoid_molecule_field(context, molecule, 0.5, xyz, count, value, gradient),
+                 OVOID_ERROR_LIMIT, "points");
+    for (size_t k = 0; k < 4 * count; ++k)
+        assert_true(*(k < count ? value + k : gradient + k - count) == -7.0);
+    free(xyz);
+    free(near);
+    free(value);
+    free(gradient);
+    ovoid_molecule_destroy(&molecule);
+    ovoid_context_destroy(&context);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(molecule_field_keeps_the_order),
@@ -222,6 +420,11 @@ int main(void) {
         cmocka_unit_test(point_beyond_single_precision),
         cmocka_unit_test(bad_arguments_change_nothing),
         cmocka_unit_test(huge_radius_is_refused),
+        cmocka_unit_test(error_is_the_same_at_every_extent),
+        cmocka_unit_test(error_of_a_wide_model),
+        cmocka_unit_test(points_far_outside),
+        cmocka_unit_test(model_that_reaches_far),
+        cmocka_unit_test(failure_leaves_the_outputs),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

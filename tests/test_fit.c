@@ -55,15 +55,10 @@ static void expect_result(ovoid_context *context, const ovoid_molecule *molecule
     test_check(context,
                ov_sample(context, xyzr, atoms, options->decay, &lattice, band, sampling, &samples));
     const size_t count = samples.points.count;
-    float *const packed =
-        read_floats(context, &samples.points.xyz, samples.points.packs * 3 * OV_PACK);
-    double *const xyz = test_alloc(3 * count, sizeof *xyz);
+    assert_int_equal(samples.points.packs, (count + OV_PACK - 1) / OV_PACK);
+    double *const xyz = read_places(context, &samples.points);
     double *const phi = test_alloc(count, sizeof *phi), *const fitted =
                                                             test_alloc(count, sizeof *phi);
-    for (size_t k = 0; k < count; ++k)
-        for (size_t axis = 0; axis < 3; ++axis)
-            xyz[3 * k + axis] = samples.points.origin[axis] +
-                                packed[k / OV_PACK * (3 * OV_PACK) + axis * OV_PACK + k % OV_PACK];
     test_check(context,
                ovoid_molecule_field(context, molecule, options->decay, xyz, count, phi, NULL));
     test_check(context, ovoid_model_field(context, model, xyz, count, fitted, NULL));
@@ -78,7 +73,6 @@ static void expect_result(ovoid_context *context, const ovoid_molecule *molecule
     assert_int_equal(result->ellipsoids, ovoid_model_size(model));
     expect_near(result->rms_error, rms, 2e-3 * rms + 1e-4, "the rms error");
     expect_near(result->max_error, largest, 2e-3 * largest + 5e-4, "the largest error");
-    free(packed);
     free(xyz);
     free(phi);
     free(fitted);

@@ -70,8 +70,10 @@ static void run_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     options->user = &run->trace;
     test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
     test_check(context, ovoid_fit(context, molecule, options, &run->model, &run->result));
-    /* An atom keeps its own ellipsoid as long as there is one: none is left without an atom. */
-    assert_int_equal(expect_owners(molecule, run->model, 3, 0.8), 0);
+    /* An atom keeps its own ellipsoid as long as there is one: none is left without an atom. Where
+     * the inside empties, whose it was comes down to rounding. */
+    const double most = options->l1.inside_every ? 0.8 : 0.5;
+    assert_int_equal(expect_owners(molecule, run->model, 3, most), 0);
     ovoid_molecule_destroy(&molecule);
 }
 
@@ -115,18 +117,11 @@ static size_t points_of(ovoid_context *context, const double *xyzr, size_t atoms
     test_check(context,
                ov_sample(context, xyzr, atoms, options->decay, &lattice, band, sampling, &samples));
     const size_t count = samples.points.count;
-    float *const packed =
-        read_floats(context, &samples.points.xyz, samples.points.packs * 3 * OV_PACK);
-    *xyz = test_alloc(3 * count, sizeof **xyz);
+    assert_int_equal(samples.points.packs, (count + OV_PACK - 1) / OV_PACK);
+    *xyz = read_places(context, &samples.points);
     *target = test_alloc(count, sizeof **target);
-    for (size_t k = 0; k < count; ++k) {
-        for (size_t axis = 0; axis < 3; ++axis)
-            (*xyz)[3 * k + axis] =
-                samples.points.origin[axis] +
-                packed[k / OV_PACK * (3 * OV_PACK) + axis * OV_PACK + k % OV_PACK];
+    for (size_t k = 0; k < count; ++k)
         (*target)[k] = reference_phi(xyzr, atoms, options->decay, *xyz + 3 * k);
-    }
-    free(packed);
     ov_samples_destroy(&samples);
     return count;
 }

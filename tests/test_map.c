@@ -81,6 +81,7 @@ static double real(const unsigned char *header, int number) {
 
 static map read_ccp4(FILE *stream) {
     unsigned char header[1024], value[4];
+    uint32_t cell = 0;
     map m;
     assert_non_null(stream);
     assert_int_equal(fread(header, 1, sizeof header, stream), sizeof header);
@@ -95,13 +96,16 @@ static map read_ccp4(FILE *stream) {
         assert_in_range(header[224 + i], ' ', '~');
     for (int axis = 0; axis < 3; axis++) {
         m.size[axis] = (long)word(header, 1 + axis);
-        assert_int_equal(word(header, 8 + axis), m.size[axis]);
+        assert_true(word(header, 8 + axis) >= m.size[axis]);
+        cell = word(header, 8 + axis) > cell ? word(header, 8 + axis) : cell;
         assert_true(real(header, 14 + axis) == 90.0);
         assert_int_equal(word(header, 17 + axis), axis + 1);
-        m.spacing[axis] = real(header, 11 + axis) / (double)m.size[axis];
+        m.spacing[axis] = real(header, 11 + axis) / (double)word(header, 8 + axis);
         m.origin[axis] = (double)(int32_t)word(header, 5 + axis) * m.spacing[axis];
-        expect_near(real(header, 50 + axis), m.origin[axis], 1e-5, "ORIGIN");
+        assert_true(real(header, 50 + axis) == 0.0); /* ORIGIN: some add it to NXSTART */
     }
+    for (int axis = 0; axis < 3; axis++) /* what ChimeraX believes */
+        assert_true(labs((long)(int32_t)word(header, 5 + axis)) <= 10 * (long)cell);
     m.low = real(header, 20);
     m.high = real(header, 21);
     m.mean = real(header, 22);
@@ -327,6 +331,63 @@ static void large_maps_come_in_pieces(void **state) {
     subject_free(&s);
 }
 
+/* Far from the origin, and on all sides of it: readers go by NXSTART, whatever the distance. */
+static void maps_far_out(void **state) {
+    static const double at[][3] = {{150, -3, 12}, {-2000, 1, 3000.7}, {1e4, 1e4, -1e4}};
+    ovoid_export_options options;
+    ovoid_export_options_init(&options);
+    for (size_t n = 0; n < sizeof at / sizeof *at; n++) {
+        subject s = {.count = 1, .quadrics = test_alloc(1, sizeof(ov_quadric))};
+        const double xyzr[4] = {at[n][0], at[n][1], at[n][2], 1.7};
+        test_check(context, ovoid_molecule_create(context, xyzr, 1, &s.molecule));
+        ov_quadric_of_atom(xyzr, decay, s.quadrics);
+        for (size_t i = 0; i < FORMATS; i++) {
+            const char *path = scratch_path(*state, formats[i].name);
+            test_check(context, export_subject(context, &s, path, &options));
+            map m = load(&formats[i], path);
+            size_t most = 0;
+            for (size_t k = 1; k < map_count(&m); k++)
+                most = m.values[k] > m.values[most] ? k : most;
+            const size_t nx = (size_t)m.size[0], ny = (size_t)m.size[1];
+            const size_t index[3] = {most % nx, most / nx % ny, most / (nx * ny)};
+            for (int axis = 0; axis < 3; axis++)
+                expect_near(m.origin[axis] + m.spacing[axis] * (double)index[axis], xyzr[axis],
+                            0.51 * options.spacing, "where the map is highest");
+            free(m.values);
+        }
+        subject_free(&s);
+    }
+}
+
+/* Refused with its size before anything is written, unless it is allowed. */
+static void large_maps_are_asked_for(void **state) {
+    const double xyzr[8] = {0, 0, 0, 1.5, 5e4, 0, 0, 1.5};
+    subject s = {.count = 2, .quadrics = test_alloc(2, sizeof(ov_quadric))};
+    ovoid_export_options options;
+    ovoid_export_options_init(&options);
+    assert_true(options.max_gigabytes == OVOID_DEFAULT_MAP_GIGABYTES);
+    test_check(context, ovoid_molecule_create(context, xyzr, 2, &s.molecule));
+    options.spacing = 5.0;
+    options.max_gigabytes = 1e-3;
+    for (size_t i = 0; i < FORMATS; i++) {
+        const char *path = scratch_path(*state, formats[i].name);
+        test_refused(context, export_subject(context, &s, path, &options), OVOID_ERROR_LIMIT,
+                     "take 0.00");
+        options.max_gigabytes = 1e-2;
+        test_check(context, export_subject(context, &s, path, &options));
+        options.max_gigabytes = 1e-3;
+        struct stat info;
+        assert_int_equal(stat(path, &info), 0);
+        assert_true(info.st_size > 1000000 && info.st_size < 10000000);
+        assert_int_equal(unlink(path), 0);
+    }
+    options.max_gigabytes = NAN;
+    test_refused(context, export_subject(context, &s, scratch_path(*state, "m.dx"), &options),
+                 OVOID_ERROR_ARGUMENT, "gigabytes");
+    assert_int_equal(scratch_entries(*state), 0);
+    subject_free(&s);
+}
+
 /* The header of a map in a pipe cannot be completed at the end: it says so as MRC2014 asks. */
 static void pipes_get_no_statistics(void **state) {
     subject s = model_subject(context);
@@ -506,6 +567,8 @@ int main(void) {
         IN_SCRATCH(maps_hold_the_field),
         IN_SCRATCH(isovalue_sets_the_room),
         IN_SCRATCH(large_maps_come_in_pieces),
+        IN_SCRATCH(maps_far_out),
+        IN_SCRATCH(large_maps_are_asked_for),
         IN_SCRATCH(pipes_get_no_statistics),
         IN_SCRATCH(failures_leave_nothing),
         IN_SCRATCH(gemmi_reads_it),

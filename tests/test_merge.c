@@ -82,10 +82,11 @@ static float *run_losses(bench *b, const charges *c, const uint32_t *pairs,
     test_check(context,
                OV_LAUNCH(context, &kernel, count * lanes, lanes, OV_ARG(pairs_count),
                          OV_ARG(list.memory), OV_ARG(terms.device.memory),
-                         OV_ARG(b->points.xyz.memory), OV_ARG(value.memory), OV_ARG(low.memory),
-                         OV_ARG(high.memory), OV_ARG(weight.memory),
-                         OV_ARG(b->lists.term_start.memory), OV_ARG(b->lists.term_item.memory),
-                         OV_ARG(b->terms.device.memory), OV_ARG(loss.memory)));
+                         OV_ARG(b->points.xyz.memory), OV_ARG(b->points.pack_origins.memory),
+                         OV_ARG(value.memory), OV_ARG(low.memory), OV_ARG(high.memory),
+                         OV_ARG(weight.memory), OV_ARG(b->lists.term_start.memory),
+                         OV_ARG(b->lists.term_item.memory), OV_ARG(b->terms.device.memory),
+                         OV_ARG(loss.memory)));
     float *const result = read_floats(context, &loss, count);
     ov_buffer *const buffers[] = {&value, &low, &high, &weight, &list, &loss};
     for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
@@ -219,18 +220,12 @@ typedef struct model {
 static void read_target(model *m) {
     const ov_points *const points = &m->samples.points;
     const size_t all = points->packs * OV_PACK;
-    float *const packed = read_floats(m->context, &points->xyz, 3 * all);
     m->points = points->count;
-    m->xyz = test_alloc(3 * all, sizeof *m->xyz);
-    for (size_t k = 0; k < all; ++k)
-        for (size_t axis = 0; axis < 3; ++axis)
-            m->xyz[3 * k + axis] =
-                points->origin[axis] +
-                packed[k / OV_PACK * (3 * OV_PACK) + axis * OV_PACK + k % OV_PACK];
+    assert_int_equal(points->packs, (m->points + OV_PACK - 1) / OV_PACK);
+    m->xyz = read_places(m->context, points);
     m->low = read_floats(m->context, &m->target.low, all);
     m->high = read_floats(m->context, &m->target.high, all);
     m->weight = read_floats(m->context, &m->target.weight, all);
-    free(packed);
 }
 
 static void evaluate(model *m) {

@@ -219,61 +219,84 @@ static void tree_has_a_limit(void **state) {
 
 /* ---- packs -------------------------------------------------------------------------------- */
 
-/* The packs hold each point once, in `order`, bit for bit; the fill repeats the last point; the
- * leaf boxes are the packs' hulls. Returns the mean diagonal of the boxes. */
-static double expect_packs(ovoid_context *context, const float *xyz, size_t count,
+/* What a place of a pack may be off, from rounding about the pack's own origin. */
+#define PLACE_ERROR 0x1p-22 /* half a unit in the last place of 8 angstrom */
+
+/* Box k of the packs is around the pack, and rounded outwards by no more than a float. */
+static void expect_box(const float *boxes, const ov_points *points, size_t pack,
+                       const double hull[6]) {
+    float box[6];
+    box_of(boxes, &points->tree, 0, pack, box);
+    for (int k = 0; k < 6; ++k) {
+        const double out = (k < 3 ? -1.0 : 1.0) * (box[k] - (hull[k] - points->origin[k % 3]));
+        assert_true(out > -PLACE_ERROR * 4.0 && out < PLACE_ERROR * 4.0 + points->rounding);
+    }
+}
+
+/* The packs hold each point once, in `order`, close to the double; what fills a pack up repeats its
+ * last point; the leaf boxes are about the packs' hulls, whose sides are 16 angstrom or 8 cells at
+ * most. Returns the mean diagonal of the boxes. */
+static double expect_packs(ovoid_context *context, const double *xyz, size_t count,
                            double resolution) {
     const double origin[3] = {1.0, 2.0, 3.0};
     ov_points points = {0};
     test_check(context, ov_points_create(context, xyz, count, origin, resolution, &points));
     assert_int_equal(points.count, count);
-    assert_int_equal(points.packs, (count + OV_PACK - 1) / OV_PACK);
+    assert_true(points.packs >= (count + OV_PACK - 1) / OV_PACK && points.packs <= count);
     assert_memory_equal(points.origin, origin, sizeof origin);
     bool *const seen = test_alloc(count, sizeof *seen);
-    for (size_t k = 0; k < count; ++k) {
-        assert_true(points.order[k] < count);
-        assert_false(seen[points.order[k]]);
-        seen[points.order[k]] = true;
-    }
-    free(seen);
-    size_t groups = 0;
+    size_t groups = 0, found = 0;
     for (unsigned level = 0; level < points.tree.levels; ++level)
         groups += (points.tree.boxes[level] + OV_GROUP - 1) / OV_GROUP;
-    float *const packed = read_floats(context, &points.xyz, points.packs * 3 * OV_PACK);
+    double *const places = read_places(context, &points);
     float *const boxes = read_floats(context, &points.boxes, groups * OV_GROUP * 6);
     double diagonals = 0.0;
     for (size_t pack = 0; pack < points.packs; ++pack) {
-        float box[6], hull[6] = {FLT_MAX, FLT_MAX, FLT_MAX, -FLT_MAX, -FLT_MAX, -FLT_MAX};
-        for (size_t j = 0; j < OV_PACK; ++j) {
-            const size_t k = pack * OV_PACK + j;
-            const float *const p = xyz + 3 * (size_t)points.order[k < count ? k : count - 1];
+        double hull[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
+        for (size_t k = pack * OV_PACK; k < (pack + 1) * OV_PACK; ++k) {
+            const size_t from = points.order[k];
+            assert_true(from < count && seen[from] == ov_points_fill(&points, k));
+            if (ov_points_fill(&points, k))
+                assert_int_equal(from, points.order[k - 1]);
+            found += !seen[from];
+            seen[from] = true;
             for (size_t axis = 0; axis < 3; ++axis) {
-                assert_true(packed[pack * 3 * OV_PACK + axis * OV_PACK + j] == p[axis]);
-                hull[axis] = fminf(hull[axis], p[axis]);
-                hull[axis + 3] = fmaxf(hull[axis + 3], p[axis]);
+                expect_near(places[3 * k + axis], xyz[3 * from + axis],
+                            PLACE_ERROR * fmax(1.0, resolution), "a coordinate");
+                hull[axis] = fmin(hull[axis], xyz[3 * from + axis]);
+                hull[axis + 3] = fmax(hull[axis + 3], xyz[3 * from + axis]);
             }
         }
-        box_of(boxes, &points.tree, 0, pack, box);
+        expect_box(boxes, &points, pack, hull);
         double square = 0.0;
-        for (int k = 0; k < 6; ++k)
-            assert_true(box[k] == hull[k]);
-        for (int k = 0; k < 3; ++k)
+        for (int k = 0; k < 3; ++k) {
+            assert_true(hull[k + 3] - hull[k] <= fmax(16.0, 8.0 * resolution));
             square += (hull[k + 3] - hull[k]) * (hull[k + 3] - hull[k]);
+        }
         diagonals += sqrt(square);
     }
+    assert_int_equal(found, count);
     const double mean = points.packs > 0 ? diagonals / (double)points.packs : 0.0;
-    free(packed);
+    free(seen);
+    free(places);
     free(boxes);
     ov_points_destroy(&points);
     ov_points_destroy(&points);
     return mean;
 }
 
+static double *random_places(test_random *random, size_t count, double half) {
+    double *const xyz = test_alloc(3 * count, sizeof *xyz);
+    for (size_t k = 0; k < 3 * count; ++k)
+        xyz[k] = random_uniform(random, -half, half);
+    return xyz;
+}
+
 static void packs_hold_every_point_once(void **state) {
     const size_t counts[] = {0, 1, 15, 16, 17, 31, 32, 33, 256, 257, 5000};
     for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n) {
         test_random random = {n};
-        float *const xyz = random_points(&random, counts[n], 10.0);
+        double *const xyz = random_places(&random, counts[n], 10.0);
         expect_packs(*state, xyz, counts[n], 0.5);
         free(xyz);
     }
@@ -283,11 +306,11 @@ static void packs_hold_every_point_once(void **state) {
  * a diagonal of 3.3 steps, a row of 16 has 15. */
 static void packs_are_compact(void **state) {
     enum { SIDE = 20 };
-    float *const xyz = test_alloc(3 * SIDE * SIDE * SIDE, sizeof *xyz);
+    double *const xyz = test_alloc(3 * SIDE * SIDE * SIDE, sizeof *xyz);
     for (size_t k = 0; k < SIDE * SIDE * SIDE; ++k) {
-        xyz[3 * k] = (float)(k % SIDE);
-        xyz[3 * k + 1] = (float)(k / SIDE % SIDE);
-        xyz[3 * k + 2] = (float)(k / (SIDE * SIDE));
+        xyz[3 * k] = (double)(k % SIDE);
+        xyz[3 * k + 1] = (double)(k / SIDE % SIDE);
+        xyz[3 * k + 2] = (double)(k / (SIDE * SIDE));
     }
     const double mean = expect_packs(*state, xyz, SIDE * SIDE * SIDE, 1.0);
     print_message("mean diagonal of a pack: %.2f steps\n", mean);
@@ -297,9 +320,9 @@ static void packs_are_compact(void **state) {
 
 static void coincident_points(void **state) {
     enum { COUNT = 100 };
-    float xyz[3 * COUNT];
+    double xyz[3 * COUNT];
     for (int k = 0; k < 3 * COUNT; ++k)
-        xyz[k] = (float)(k % 3) - 0.7f;
+        xyz[k] = (double)(k % 3) - 0.7;
     expect_packs(*state, xyz, COUNT, 0.5);
     expect_packs(*state, xyz, COUNT, 0.0); /* the step of a lattice that is one point */
 }
@@ -308,19 +331,56 @@ static void coincident_points(void **state) {
 static void odd_extents(void **state) {
     enum { COUNT = 300 };
     test_random random = {5};
-    float *const xyz = random_points(&random, COUNT, 5.0);
+    double *const xyz = random_places(&random, COUNT, 5.0);
     for (size_t k = 0; k < COUNT; ++k)
-        xyz[3 * k] += 1e6f;
+        xyz[3 * k] += 1e6;
     expect_packs(*state, xyz, COUNT, 0.5);
     for (size_t k = 0; k < COUNT; ++k)
-        xyz[3 * k] = k % 2 ? 1e12f : -1e12f;
+        xyz[3 * k] = k % 2 ? 1e12 : -1e12;
     expect_packs(*state, xyz, COUNT, 0.5);
     for (size_t k = 0; k < COUNT; ++k)
-        xyz[3 * k] = 0.0f;
+        xyz[3 * k] = 0.0;
     expect_packs(*state, xyz, COUNT, 0.5);
     for (size_t k = 0; k < COUNT; ++k)
-        xyz[3 * k + 1] = -3.0f;
+        xyz[3 * k + 1] = -3.0;
     expect_packs(*state, xyz, COUNT, 0.5);
+    free(xyz);
+}
+
+/* A pack ends where the next point is far away: clusters a thousand angstrom apart, and points that
+ * are all alone. Those of a cluster still share packs. */
+static void packs_end_at_gaps(void **state) {
+    enum { CLUSTERS = 10, OWN = 37, COUNT = CLUSTERS * OWN };
+    const double origin[3] = {0.0, 0.0, 0.0};
+    test_random random = {6};
+    double xyz[3 * COUNT];
+    ov_points points = {0};
+    for (size_t k = 0; k < COUNT; ++k)
+        for (size_t axis = 0; axis < 3; ++axis)
+            xyz[3 * k + axis] = 1e3 * (double)(k % CLUSTERS) + random_uniform(&random, -3.0, 3.0);
+    expect_packs(*state, xyz, COUNT, 0.5);
+    test_check(*state, ov_points_create(*state, xyz, COUNT, origin, 0.5, &points));
+    assert_int_equal(points.packs, CLUSTERS * 3);
+    ov_points_destroy(&points);
+    for (size_t k = 0; k < 3 * COUNT; ++k)
+        xyz[k] = random_uniform(&random, -1e6, 1e6);
+    expect_packs(*state, xyz, COUNT, 1.0);
+}
+
+/* The curve is fine enough to keep the packs of dense clusters small, as far apart as they may be.
+ */
+static void clusters_at_both_ends(void **state) {
+    enum { COUNT = 20000 };
+    const double origin[3] = {0.0, 0.0, 0.0};
+    test_random random = {8};
+    double *const xyz = random_places(&random, COUNT, 15.0);
+    ov_points points = {0};
+    for (size_t k = 0; k < 3 * COUNT; ++k)
+        xyz[k] += k / 3 % 2 ? 1e6 : -1e6;
+    test_check(*state, ov_points_create(*state, xyz, COUNT, origin, 1.0, &points));
+    assert_true(points.packs < COUNT / OV_PACK + 10);
+    assert_true(expect_packs(*state, xyz, COUNT, 1.0) < 7.0);
+    ov_points_destroy(&points);
     free(xyz);
 }
 
@@ -337,6 +397,8 @@ int main(void) {
         cmocka_unit_test(packs_are_compact),
         cmocka_unit_test(coincident_points),
         cmocka_unit_test(odd_extents),
+        cmocka_unit_test(packs_end_at_gaps),
+        cmocka_unit_test(clusters_at_both_ends),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

@@ -100,16 +100,16 @@ static size_t expect_samples(ovoid_context *context, const job *j) {
     const ov_points *const points = &samples.points;
     const size_t all = (size_t)(lattice.size[0] * lattice.size[1] * lattice.size[2]);
     bool *const kept = test_alloc(all, sizeof *kept);
-    float *const packed = read_floats(context, &points->xyz, points->packs * 3 * OV_PACK);
+    double *const xyz = read_places(context, points);
     float *const value = read_floats(context, &samples.value, points->packs * OV_PACK);
     float *const slope = read_floats(context, &samples.gradient, points->packs * 3 * OV_PACK);
     double phi;
     reference_sum gradient[3];
-    for (size_t k = 0; k < points->count; ++k) {
+    for (size_t k = 0; k < points->packs * OV_PACK; ++k) {
         const size_t at = k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
-        double y[3];
-        for (size_t axis = 0; axis < 3; ++axis)
-            y[axis] = points->origin[axis] + packed[at + axis * OV_PACK];
+        const double *const y = xyz + 3 * k;
+        if (ov_points_fill(points, k))
+            continue;
         const size_t index = index_of(&lattice, y);
         assert_false(kept[index]);
         kept[index] = true;
@@ -137,7 +137,7 @@ static size_t expect_samples(ovoid_context *context, const job *j) {
     const size_t count = points->count;
     print_message("%zu of %zu lattice points kept, %zu wanted\n", count, all, wanted);
     free(kept);
-    free(packed);
+    free(xyz);
     free(value);
     free(slope);
     ov_samples_destroy(&samples);
@@ -420,6 +420,102 @@ static void sampling_can_be_stopped(void **state) {
     assert_null(samples.points.order);
 }
 
+/* ---- large structures --------------------------------------------------------------------- */
+
+/* Molecules a long way apart: phi and its gradient at the samples are as good as anywhere. */
+static void samples_of_a_wide_structure(void **state) {
+    enum { MOLECULES = 3, OWN = 5, ALL = MOLECULES * OWN };
+    const double far = 40000.0, spacing = 0.9, padding = 1.5;
+    const ov_band band = {.low = 0.1, .high = 2.0, .inside_every = 2};
+    double xyzr[4 * ALL], worst = 0.0, worst_slope = 0.0;
+    test_random random = {70};
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    test_skip_simulated(*state);
+    random_atoms(&random, xyzr, ALL, (const double[3]){2.0, 2.0, 2.0});
+    for (size_t i = 0; i < ALL; ++i)
+        xyzr[4 * i] += far * ((double)(i / OWN) - 1.0);
+    test_check(*state, ov_lattice_create(*state, xyzr, ALL, spacing, padding, &lattice));
+    test_check(*state, ov_sample(*state, xyzr, ALL, 0.5, &lattice, band, no_questions, &samples));
+    const size_t all = samples.points.packs * OV_PACK;
+    double *const xyz = read_places(*state, &samples.points);
+    float *const value = read_floats(*state, &samples.value, all);
+    float *const slope = read_floats(*state, &samples.gradient, 3 * all);
+    assert_true(samples.points.count > 300);
+    for (size_t k = 0; k < all; ++k) {
+        const float *const g = slope + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
+        const double phi = reference_phi(xyzr, ALL, 0.5, xyz + 3 * k);
+        double off = 0.0, length = 0.0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            double wanted = 0.0;
+            for (size_t i = 0; i < ALL; ++i)
+                wanted -= (xyz[3 * k + axis] - xyzr[4 * i + axis]) *
+                          reference_phi(xyzr + 4 * i, 1, 0.5, xyz + 3 * k);
+            off += pow(g[axis * OV_PACK] - wanted, 2.0);
+            length += wanted * wanted;
+        }
+        worst = fmax(worst, fabs(value[k] - phi) / phi);
+        worst_slope = fmax(worst_slope, sqrt(off) / fmax(sqrt(length), phi));
+    }
+    print_message("largest relative errors %.2g, gradient %.2g\n", worst, worst_slope);
+    assert_true(worst < 3e-6 && worst_slope < 6e-6);
+    free(xyz);
+    free(value);
+    free(slope);
+    ov_samples_destroy(&samples);
+}
+
+/* Lists are made slice by slice: a device whose buffers hold the samples, and not all pairs of them
+ * with atoms, suffices. */
+static void lists_of_samples_need_little_room(void **state) {
+    enum { MANY = 2500 };
+    const ov_band band = {.low = 1e-3, .high = 1e30};
+    double *const xyzr = test_alloc(4 * MANY, sizeof *xyzr);
+    test_random random = {71};
+    ovoid_context *context = NULL;
+    ov_device *device = NULL;
+    ov_lattice lattice;
+    ov_samples samples = {0};
+    ov_terms terms = {0};
+    ov_lists lists = {.packs_only = true};
+    test_skip_simulated(*state);
+    if (test_small())
+        skip();
+    assert_int_equal(ovoid_context_create(&context), OVOID_OK);
+    test_check(context, ovoid_context_open_device(context, NULL));
+    test_check(context, ov_device_get(context, &device));
+    random_atoms(&random, xyzr, MANY, (const double[3]){14.0, 14.0, 14.0});
+    test_check(context, ov_lattice_create(context, xyzr, MANY, 0.42, 3.0, &lattice));
+    device->info.max_allocation = (uint64_t)8 << 20;
+    test_check(context,
+               ov_sample(context, xyzr, MANY, 0.5, &lattice, band, no_questions, &samples));
+    assert_true(samples.points.packs > 1 << 14); /* more than a slice */
+    /* all at once they would not have room */
+    ov_quadric *const quadrics = test_alloc(MANY, sizeof *quadrics);
+    for (size_t i = 0; i < MANY; ++i)
+        ov_quadric_of_atom(xyzr + 4 * i, 0.5, &quadrics[i]);
+    test_check(context, ov_terms_set(context, &terms, quadrics, MANY, samples.points.origin,
+                                     OV_TARGET_CUTOFF));
+    test_refused(context, ov_lists_build(context, &lists, &samples.points, &terms, 0.0),
+                 OVOID_ERROR_LIMIT, "bytes");
+    /* and each slice has what belongs to it */
+    const size_t all = samples.points.packs * OV_PACK;
+    double *const xyz = read_places(context, &samples.points);
+    float *const value = read_floats(context, &samples.value, all);
+    for (size_t k = 0; k < all; k += 1009) {
+        const double phi = reference_phi(xyzr, MANY, 0.5, xyz + 3 * k);
+        expect_near(value[k], phi, 3e-6 * phi + 1e-7 * MANY, "phi");
+    }
+    free(xyz);
+    free(value);
+    free(quadrics);
+    free(xyzr);
+    ov_terms_destroy(&terms);
+    ov_lists_destroy(&lists);
+    ov_samples_destroy(&samples);
+    ovoid_context_destroy(&context);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(small_molecule),
@@ -435,6 +531,8 @@ int main(void) {
         cmocka_unit_test(empty_space_between_atoms),
         cmocka_unit_test(atoms_at_the_ends_of_space),
         cmocka_unit_test(sampling_can_be_stopped),
+        cmocka_unit_test(samples_of_a_wide_structure),
+        cmocka_unit_test(lists_of_samples_need_little_room),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

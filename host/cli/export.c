@@ -18,6 +18,8 @@ static const cli_number numbers[] = {
          "hundredth of it; 0 takes the model's, or 1 for a molecule"),
     REAL("opacity", options.opacity, 0, false, 1, "", "of drawn ellipsoids, 0 to 1"),
     REAL("spacing", options.spacing, 0, true, 1e3, "Å", "of a map's points"),
+    REAL("max-gigabytes", options.max_gigabytes, 0, true, 1e6, "GB",
+         "a map that would take more is refused"),
     REAL("decay", decay, 0, true, 100, "Å⁻²",
          "decay rate d of the atoms' Gaussians, for a molecule"),
 };
@@ -70,7 +72,8 @@ void cli_export_help(FILE *stream) {
           "Files:\n"
           "  -o, --output FILE   where it goes, - for standard output\n"
           "  --as bild|cxc|pymol|gmm|json|ccp4|dx\n"
-          "                      what to write when the extension does not say\n",
+          "                      what to write when the extension does not say; where it says\n"
+          "                      something else, nothing is written\n",
           stream);
     reading_help(stream, true);
     fputs("\n"

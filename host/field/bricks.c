@@ -6,18 +6,17 @@ _Static_assert(OV_BRICK_X *OV_BRICK_Y *OV_BRICK_Z == OV_PACK, "a brick is a pack
 
 static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
-/* Fills one brick's packed coordinates and box. */
-static void lay_brick(const uint64_t at[3], const double step[3], float *packed, float *box) {
+/* Fills one brick's origin, its first point, and coordinates. */
+static void lay_brick(const uint64_t at[3], const double step[3], float *origin, float *packed) {
+    for (size_t axis = 0; axis < 3; ++axis)
+        origin[axis] = ov_to_float((double)(at[axis] * brick[axis]) * step[axis]);
+    origin[3] = OV_PACK;
     for (uint64_t j = 0; j < OV_PACK; ++j) {
         uint64_t within[3];
         ov_brick_point(j, within);
         for (size_t axis = 0; axis < 3; ++axis) {
-            const float x = (float)((double)(at[axis] * brick[axis] + within[axis]) * step[axis]);
-            packed[axis * OV_PACK + j] = x;
-            if (j == 0)
-                box[axis] = x;
-            if (j == OV_PACK - 1)
-                box[axis + 3] = x;
+            const double x = (double)(at[axis] * brick[axis] + within[axis]) * step[axis];
+            packed[axis * OV_PACK + j] = (float)(x - (double)origin[axis]);
         }
     }
 }
@@ -45,21 +44,21 @@ ovoid_status ov_bricks_upload(ovoid_context *context, const uint64_t bricks[3],
     ovoid_status status = OVOID_OK;
     const size_t packs = (size_t)(bricks[0] * bricks[1] * bricks[2]);
     float *const packed = ov_alloc(context, packs * 3 * OV_PACK, sizeof *packed, "lattice points");
-    float *const boxes = ov_alloc(context, packs * 6, sizeof *boxes, "lattice bricks");
-    if (!packed || !boxes) {
+    points->pack_origin =
+        ov_alloc(context, packs * 4, sizeof *points->pack_origin, "lattice bricks");
+    if (!packed || !points->pack_origin) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
     for (size_t k = 0; k < packs; ++k) {
         const uint64_t at[3] = {order[k] % bricks[0], order[k] / bricks[0] % bricks[1],
                                 order[k] / (bricks[0] * bricks[1])};
-        lay_brick(at, step, packed + k * (3 * OV_PACK), boxes + k * 6);
+        lay_brick(at, step, points->pack_origin + 4 * k, packed + k * (3 * OV_PACK));
     }
     points->count = packs * OV_PACK;
     points->packs = packs;
-    OV_TRY(ov_points_upload(context, packed, boxes, points));
+    OV_TRY(ov_points_upload(context, packed, points));
 cleanup:
     free(packed);
-    free(boxes);
     return status;
 }

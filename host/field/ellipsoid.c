@@ -115,3 +115,34 @@ double ov_quadric_log_value(const ov_quadric *quadric, const double at[3]) {
     return log(quadric->amplitude) - (a[0] * x * x + a[3] * y * y + a[5] * z * z +
                                       2.0 * (a[1] * x * y + a[2] * x * z + a[4] * y * z));
 }
+
+/* Eigenvalues below this share of A's trace are all rounding. */
+#define SHARE_LEAST 1e-14
+
+/* The largest that the half-widths can be: along the longest axis. */
+static double longest_reach(const double a[6], double q) {
+    double matrix[3][3] = {{a[0], a[1], a[2]}, {a[1], a[3], a[4]}, {a[2], a[4], a[5]}};
+    double decay[3], axes[3][3];
+    const double trace = a[0] + a[3] + a[5];
+    ov_symmetric_axes(matrix, decay, axes);
+    return sqrt(q / fmax(decay[2] - SHARE_LEAST * trace, SHARE_LEAST * trace));
+}
+
+/* A plane with normal n touches z^T A z = q at sqrt(q n^T A^-1 n). The inverse of a long needle's A
+ * is all rounding, so there the longest axis bounds all three. */
+bool ov_quadric_reach(const ov_quadric *quadric, double floor, double half[3]) {
+    const double *const a = quadric->a; /* xx, xy, xz, yy, yz, zz */
+    const double q = log(quadric->amplitude / floor);
+    if (!(q > 0.0))
+        return false;
+    const double cofactor[3] = {a[3] * a[5] - a[4] * a[4], a[0] * a[5] - a[2] * a[2],
+                                a[0] * a[3] - a[1] * a[1]};
+    const double determinant = a[0] * cofactor[0] + a[1] * (a[2] * a[4] - a[1] * a[5]) +
+                               a[2] * (a[1] * a[4] - a[2] * a[3]);
+    const double trace = a[0] + a[3] + a[5];
+    const bool rounded = !(determinant > 1e-9 * trace * trace * trace);
+    const double longest = rounded ? longest_reach(a, q) : 0.0;
+    for (int axis = 0; axis < 3; ++axis)
+        half[axis] = (1.0 + 1e-6) * (rounded ? longest : sqrt(q * cofactor[axis] / determinant));
+    return true;
+}

@@ -6,6 +6,8 @@
 
 #include "ovoid/ovoid.h"
 
+#include <stdbool.h>
+
 /* amplitude * exp(-(x - centre)^T A (x - centre)); a = A's xx, xy, xz, yy, yz, zz (angstrom^-2). */
 typedef struct ov_quadric {
     double amplitude;
@@ -30,6 +32,10 @@ void ov_quadric_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_quadric *quadr
 
 /* ln of its value at a point. */
 double ov_quadric_log_value(const ov_quadric *quadric, const double at[3]);
+
+/* Half the widths of the box about the region where the Gaussian is at least `floor`, angstrom; no
+ * smaller than they are. False if it nowhere is. */
+bool ov_quadric_reach(const ov_quadric *quadric, double floor, double half[3]);
 
 /* Largest d r^2 of an atom: up to here its exp(d r^2), and sums of many, fit a float. */
 #define OV_EXPONENT_MAX 80.0

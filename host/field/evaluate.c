@@ -1,7 +1,5 @@
 #include "field/evaluate.h"
 
-#include "field/field.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,68 +7,158 @@
 /* Points handled at once, which bounds the memory on the device. */
 #define PIECE ((size_t)1 << 20)
 
-typedef struct evaluator {
-    double origin[3];
-    ov_terms terms;
-    ov_lists lists;
-    ov_operations operations;
-    ov_buffer value, gradient;
-    float *xyz;     /* 3 * PIECE, relative to origin */
-    float *results; /* 4 * (PIECE + OV_PACK): values, then gradients */
-} evaluator;
+/* Cells of the curve along which points are put in packs, angstrom. */
+#define CELL 1.0
+
+/* ---- terms -------------------------------------------------------------------------------- */
 
 /* Middle of the ellipsoids' centres: there float coordinates are finest. */
-static void middle(const ov_quadric *quadrics, size_t count, double origin[3]) {
+static void find_middle(ov_evaluator *e, const ov_quadric *quadrics, size_t count) {
     for (int axis = 0; axis < 3; ++axis) {
         double low = INFINITY, high = -INFINITY;
         for (size_t i = 0; i < count; ++i) {
             low = fmin(low, quadrics[i].centre[axis]);
             high = fmax(high, quadrics[i].centre[axis]);
         }
-        origin[axis] = 0.5 * (low + high);
+        e->origin[axis] = count ? 0.5 * low + 0.5 * high : 0.0;
     }
 }
 
-/* A curve cell that holds a few points on average, whatever their spread. */
-static double curve_resolution(const float *xyz, size_t count) {
-    double extent = 0.0;
-    for (size_t axis = 0; axis < 3; ++axis) {
-        float low = xyz[axis], high = xyz[axis];
-        for (size_t k = 1; k < count; ++k) {
-            low = fminf(low, xyz[3 * k + axis]);
-            high = fmaxf(high, xyz[3 * k + axis]);
+/* The box of all that the terms reach. */
+static void find_box(ov_evaluator *e, const ov_quadric *quadrics, size_t count) {
+    for (int axis = 0; axis < 3; ++axis) {
+        e->low[axis] = INFINITY;
+        e->high[axis] = -INFINITY;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        double half[3];
+        if (!ov_quadric_reach(&quadrics[i], OV_TARGET_CUTOFF, half))
+            continue;
+        for (int axis = 0; axis < 3; ++axis) {
+            e->low[axis] = fmin(e->low[axis], quadrics[i].centre[axis] - half[axis]);
+            e->high[axis] = fmax(e->high[axis], quadrics[i].centre[axis] + half[axis]);
         }
-        extent = fmax(extent, (double)high - low);
     }
-    return fmax(extent / (2.0 * cbrt((double)count)), 1e-3);
 }
 
-static ovoid_status evaluate_piece(ovoid_context *context, evaluator *e, const double *xyz,
-                                   size_t count, double *value, double *gradient) {
+ovoid_status ov_evaluator_create(ovoid_context *context, const ov_quadric *quadrics, size_t count,
+                                 ov_evaluator *evaluator) {
+    ov_evaluator made = {.lists.packs_only = true};
+    find_middle(&made, quadrics, count);
+    find_box(&made, quadrics, count);
+    const ovoid_status status =
+        ov_terms_set(context, &made.terms, quadrics, count, made.origin, OV_TARGET_CUTOFF);
+    if (status == OVOID_OK)
+        *evaluator = made;
+    else
+        ov_evaluator_destroy(&made);
+    return status;
+}
+
+void ov_evaluator_destroy(ov_evaluator *evaluator) {
+    ov_terms_destroy(&evaluator->terms);
+    ov_lists_destroy(&evaluator->lists);
+    ov_operations_destroy(&evaluator->operations);
+    ov_buffer_destroy(&evaluator->value);
+    ov_buffer_destroy(&evaluator->gradient);
+    free(evaluator->xyz);
+    free(evaluator->index);
+    free(evaluator->results);
+    memset(evaluator, 0, sizeof *evaluator);
+}
+
+/* ---- points ------------------------------------------------------------------------------- */
+
+static bool is_within(const ov_evaluator *e, const double *p) {
+    return p[0] >= e->low[0] && p[0] <= e->high[0] && p[1] >= e->low[1] && p[1] <= e->high[1] &&
+           p[2] >= e->low[2] && p[2] <= e->high[2];
+}
+
+/* Lists the piece's points within the box. Those beyond may be so far out that their squares exceed
+ * a float's range, and the device never sees them. */
+static ovoid_status take_points(ovoid_context *context, ov_evaluator *e, const double *xyz,
+                                size_t count, size_t *taken) {
     ovoid_status status = OVOID_OK;
-    ov_points points = {0};
-    for (size_t k = 0; k < 3 * count; ++k)
-        e->xyz[k] = (float)(xyz[k] - e->origin[k % 3]);
-    OV_TRY(ov_points_create(context, e->xyz, count, e->origin, curve_resolution(e->xyz, count),
-                            &points));
-    OV_TRY(ov_lists_build(context, &e->lists, &points, &e->terms, 0.0));
-    OV_TRY(ov_field_gradient(context, &e->operations, &points, &e->terms, &e->lists, &e->value,
-                             &e->gradient));
-    const size_t values = points.packs * OV_PACK;
-    float *const gradients = e->results + values;
-    OV_TRY(ov_buffer_read(context, &e->value, 0, e->results, values * sizeof(float)));
-    OV_TRY(ov_buffer_read(context, &e->gradient, 0, gradients, 3 * values * sizeof(float)));
-    for (size_t k = 0; k < count; ++k) {
-        const size_t to = points.order[k];
-        const float *const g = gradients + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
+    size_t within = 0;
+    for (size_t k = 0; k < count; ++k)
+        within += is_within(e, xyz + 3 * k);
+    OV_TRY(ov_grow(context, &e->xyz, &e->xyz_capacity, 3 * within, sizeof *e->xyz, "points"));
+    OV_TRY(ov_grow(context, &e->index, &e->index_capacity, within, sizeof *e->index, "points"));
+    *taken = 0;
+    for (size_t k = 0; k < count; ++k)
+        if (is_within(e, xyz + 3 * k)) {
+            memcpy(e->xyz + 3 * *taken, xyz + 3 * k, 3 * sizeof *xyz);
+            e->index[(*taken)++] = (uint32_t)k;
+        }
+cleanup:
+    return status;
+}
+
+/* Values, and gradients if they are wanted, at the packs, into e->results. */
+static ovoid_status evaluate_packs(ovoid_context *context, ov_evaluator *e, const ov_points *points,
+                                   bool with_gradient) {
+    ovoid_status status = OVOID_OK;
+    const size_t values = points->packs * OV_PACK;
+    OV_TRY(ov_grow(context, &e->results, &e->results_capacity, values * (with_gradient ? 4 : 1),
+                   sizeof *e->results, "values at points"));
+    OV_TRY(ov_lists_build(context, &e->lists, points, &e->terms, 0.0));
+    if (with_gradient)
+        OV_TRY(ov_field_gradient(context, &e->operations, points, &e->terms, &e->lists, &e->value,
+                                 &e->gradient));
+    else
+        OV_TRY(ov_field(context, &e->operations, points, &e->terms, &e->lists, &e->value));
+    OV_TRY(ov_buffer_read(context, &e->value, 0, e->results, values * sizeof *e->results));
+    if (with_gradient)
+        OV_TRY(ov_buffer_read(context, &e->gradient, 0, e->results + values,
+                              3 * values * sizeof *e->results));
+cleanup:
+    return status;
+}
+
+/* Hands the packs' results out to the piece's points; what fills a pack up repeats one of them. */
+static void spread(const ov_evaluator *e, const ov_points *points, float *value, float *gradient) {
+    const size_t values = points->packs * OV_PACK;
+    for (size_t k = 0; k < values; ++k) {
+        const size_t to = e->index[points->order[k]];
+        const float *const g = e->results + values + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
         value[to] = e->results[k];
         for (size_t axis = 0; gradient && axis < 3; ++axis)
             gradient[3 * to + axis] = g[axis * OV_PACK];
     }
+}
+
+static ovoid_status run_piece(ovoid_context *context, ov_evaluator *e, const double *xyz,
+                              size_t count, float *value, float *gradient) {
+    ovoid_status status = OVOID_OK;
+    ov_points points = {0};
+    size_t taken = 0;
+    OV_TRY(take_points(context, e, xyz, count, &taken));
+    if (taken > 0) {
+        OV_TRY(ov_points_create(context, e->xyz, taken, e->origin, CELL, &points));
+        OV_TRY(evaluate_packs(context, e, &points, gradient != NULL));
+    }
+    memset(value, 0, count * sizeof *value);
+    if (gradient)
+        memset(gradient, 0, 3 * count * sizeof *gradient);
+    spread(e, &points, value, gradient);
 cleanup:
     ov_points_destroy(&points);
     return status;
 }
+
+ovoid_status ov_evaluator_run(ovoid_context *context, ov_evaluator *evaluator, const double *xyz,
+                              size_t count, float *value, float *gradient) {
+    ovoid_status status = OVOID_OK;
+    for (size_t first = 0; first < count; first += PIECE) {
+        const size_t some = count - first < PIECE ? count - first : PIECE;
+        OV_TRY(run_piece(context, evaluator, xyz + 3 * first, some, value + first,
+                         gradient ? gradient + 3 * first : NULL));
+    }
+cleanup:
+    return status;
+}
+
+/* ---- once --------------------------------------------------------------------------------- */
 
 static ovoid_status check_points(ovoid_context *context, const double *xyz, size_t count) {
     for (size_t k = 0; k < 3 * count; ++k)
@@ -83,31 +171,23 @@ static ovoid_status check_points(ovoid_context *context, const double *xyz, size
 ovoid_status ov_evaluate(ovoid_context *context, const ov_quadric *quadrics, size_t quadric_count,
                          const double *xyz, size_t count, double *value, double *gradient) {
     ovoid_status status = OVOID_OK;
-    evaluator e = {.lists.packs_only = true};
+    ov_evaluator e = {0};
+    float *results = NULL; /* of all points, so that on failure the caller's stay as they are */
     if (count == 0)
         return OVOID_OK;
-    const size_t piece = count < PIECE ? count : PIECE;
     OV_TRY(check_points(context, xyz, count));
-    e.xyz = ov_alloc(context, 3 * piece, sizeof *e.xyz, "points");
-    e.results = ov_alloc(context, 4 * (piece + OV_PACK), sizeof *e.results, "values at points");
-    if (!e.xyz || !e.results) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    middle(quadrics, quadric_count, e.origin);
-    OV_TRY(ov_terms_set(context, &e.terms, quadrics, quadric_count, e.origin, OV_TARGET_CUTOFF));
-    for (size_t first = 0; first < count; first += piece) {
-        const size_t some = count - first < piece ? count - first : piece;
-        OV_TRY(evaluate_piece(context, &e, xyz + 3 * first, some, value + first,
-                              gradient ? gradient + 3 * first : NULL));
-    }
+    results = ov_alloc(context, count, (gradient ? 4 : 1) * sizeof *results, "values at points");
+    if (!results)
+        return OVOID_ERROR_MEMORY;
+    float *const slopes = gradient ? results + count : NULL;
+    OV_TRY(ov_evaluator_create(context, quadrics, quadric_count, &e));
+    OV_TRY(ov_evaluator_run(context, &e, xyz, count, results, slopes));
+    for (size_t k = 0; k < count; ++k)
+        value[k] = results[k];
+    for (size_t k = 0; gradient && k < 3 * count; ++k)
+        gradient[k] = slopes[k];
 cleanup:
-    ov_terms_destroy(&e.terms);
-    ov_lists_destroy(&e.lists);
-    ov_operations_destroy(&e.operations);
-    ov_buffer_destroy(&e.value);
-    ov_buffer_destroy(&e.gradient);
-    free(e.xyz);
-    free(e.results);
+    ov_evaluator_destroy(&e);
+    free(results);
     return status;
 }

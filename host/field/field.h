@@ -12,29 +12,62 @@
 #include "field/ellipsoid.h"
 #include "shared.h"
 
+/* The float next to x, for what is then to be subtracted from x. Through memory, since GCC 12 drops
+ * the rounding of (double)(float)x where it makes vectors of it. */
+static inline float ov_to_float(double x) {
+    volatile float rounded = (float)x;
+    return rounded;
+}
+
 /* ---- points ------------------------------------------------------------------------------- */
 
 typedef struct ov_points {
     size_t count;
-    size_t packs;     /* ceil(count / OV_PACK); the last one is filled up with its last point */
-    double origin[3]; /* angstrom, subtracted before rounding to float */
-    uint32_t *order;  /* point k of the packs is point order[k] of the caller, count entries; NULL
-                         where nobody needs it */
-    ov_tree tree;     /* of boxes over the packs */
-    ov_buffer xyz;    /* device: per pack OV_PACK x, y, z */
-    ov_buffer boxes;  /* device: the tree's boxes */
+    size_t packs;
+    double origin[3];   /* angstrom: what packs and terms are relative to */
+    float *pack_origin; /* 4 per pack: x, y, z of its own origin, which its points are relative
+                           to, and how many points it has; its last one repeated fills it up */
+    uint32_t *order;    /* place k of the packs holds the caller's point order[k], OV_PACK entries
+                           per pack; NULL where nobody needs it */
+    ov_tree tree;       /* of boxes over the packs */
+    float rounding;     /* angstrom by which boxes and floats of centres may be off together */
+    ov_buffer xyz;      /* device: per pack OV_PACK x, y, z */
+    ov_buffer pack_origins; /* device: pack_origin */
+    ov_buffer boxes;        /* device: the tree's boxes */
 } ov_points;
 
 /* Sorts `count` points along a space-filling curve, cuts them into packs, uploads. xyz: 3 * count
- * floats, relative to origin (angstrom); resolution: size of the curve's cells, angstrom. */
-ovoid_status ov_points_create(ovoid_context *context, const float *xyz, size_t count,
+ * coordinates, angstrom; resolution: size of the curve's cells, angstrom. A pack ends early where
+ * its next point is far away, so that all its points are near its origin. */
+ovoid_status ov_points_create(ovoid_context *context, const double *xyz, size_t count,
                               const double origin[3], double resolution, ov_points *points);
 void ov_points_destroy(ov_points *points);
 
-/* Uploads points that are in packs already: count and packs are set, packed holds OV_PACK x, y, z
- * per pack, leaves each pack's box (low x, y, z, high x, y, z). */
-ovoid_status ov_points_upload(ovoid_context *context, const float *packed, const float *leaves,
-                              ov_points *points);
+/* How far (angstrom, along each axis) points of such a pack may be from its origin. */
+double ov_points_pack_reach(double resolution);
+
+/* Uploads points that are in packs already: packed holds OV_PACK x, y, z per pack, and all that is
+ * the host's is set, except the tree and rounding. */
+ovoid_status ov_points_upload(ovoid_context *context, const float *packed, ov_points *points);
+
+/* Points of a pack, without those that fill it up. */
+static inline size_t ov_pack_points(const ov_points *points, size_t pack) {
+    return (size_t)points->pack_origin[4 * pack + 3];
+}
+
+/* Whether place k of the packs repeats another point. */
+static inline bool ov_points_fill(const ov_points *points, size_t k) {
+    return k % OV_PACK >= ov_pack_points(points, k / OV_PACK);
+}
+
+/* Coordinates (angstrom) of place k of the packs, given what points->xyz holds. */
+static inline void ov_points_at(const ov_points *points, const float *packed, size_t k,
+                                double at[3]) {
+    const size_t pack = k / OV_PACK;
+    for (size_t axis = 0; axis < 3; ++axis)
+        at[axis] = points->origin[axis] + (double)points->pack_origin[4 * pack + axis] +
+                   (double)packed[(3 * pack + axis) * OV_PACK + k % OV_PACK];
+}
 
 /* The box about the OV_PACK x, y, z of a pack: low x, y, z, high x, y, z. */
 void ov_pack_box(const float *pack, float box[6]);

@@ -66,7 +66,7 @@ static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_point
     ovoid_status status = OVOID_OK;
     const size_t told = p->counters + (lists->packs_only ? 0 : p->terms);
     const cl_uint room = (cl_uint)chunks_held(lists);
-    const cl_float grow = (cl_float)skin;
+    const cl_float grow = (cl_float)(skin + (double)points->rounding);
     memset(lists->scan, 0, p->counters * sizeof *lists->scan);
     OV_TRY(
         ov_buffer_write(context, &lists->tally, 0, lists->scan, p->counters * sizeof *lists->scan));

@@ -67,8 +67,9 @@ ovoid_status ov_field(ovoid_context *context, ov_operations *operations, const o
     OV_TRY(reserve_values(context, points, value));
     OV_TRY(launch_packs(context, &operations->field, points->packs,
                         ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
-                             OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
-                             OV_ARG(terms->device.memory), OV_ARG(value->memory))));
+                             OV_ARG(points->pack_origins.memory), OV_ARG(lists->pack_start.memory),
+                             OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
+                             OV_ARG(value->memory))));
 cleanup:
     return status;
 }
@@ -84,9 +85,9 @@ ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operatio
     OV_TRY(reserve_values(context, points, value));
     OV_TRY(launch_packs(context, &operations->field_polynomial, points->packs,
                         ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
-                             OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
-                             OV_ARG(terms->device.memory), OV_ARG(polynomial->memory),
-                             OV_ARG(weights), OV_ARG(value->memory))));
+                             OV_ARG(points->pack_origins.memory), OV_ARG(lists->pack_start.memory),
+                             OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
+                             OV_ARG(polynomial->memory), OV_ARG(weights), OV_ARG(value->memory))));
 cleanup:
     return status;
 }
@@ -102,9 +103,9 @@ ovoid_status ov_field_gradient(ovoid_context *context, ov_operations *operations
                              "gradients at points"));
     OV_TRY(launch_packs(context, &operations->field_gradient, points->packs,
                         ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
-                             OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
-                             OV_ARG(terms->device.memory), OV_ARG(value->memory),
-                             OV_ARG(gradient->memory))));
+                             OV_ARG(points->pack_origins.memory), OV_ARG(lists->pack_start.memory),
+                             OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
+                             OV_ARG(value->memory), OV_ARG(gradient->memory))));
 cleanup:
     return status;
 }
@@ -118,7 +119,8 @@ ovoid_status ov_moments(ovoid_context *context, ov_operations *operations, const
     OV_TRY(ov_buffer_reserve(context, result, terms->count * 2 * OV_MONOMIALS * sizeof(cl_float),
                              "moments"));
     OV_TRY(launch_terms(context, &operations->moments, terms->count,
-                        ARGS(OV_ARG(count), OV_ARG(points->xyz.memory), OV_ARG(u->memory),
+                        ARGS(OV_ARG(count), OV_ARG(points->xyz.memory),
+                             OV_ARG(points->pack_origins.memory), OV_ARG(u->memory),
                              OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
                              OV_ARG(terms->device.memory), OV_ARG(result->memory))));
 cleanup:
@@ -134,7 +136,8 @@ ovoid_status ov_gram(ovoid_context *context, ov_operations *operations, const ov
     OV_TRY(ov_buffer_reserve(context, result, terms->count * OV_GRAM * sizeof(cl_float),
                              "sums of products"));
     OV_TRY(launch_terms(context, &operations->gram, terms->count,
-                        ARGS(OV_ARG(count), OV_ARG(points->xyz.memory), OV_ARG(w->memory),
+                        ARGS(OV_ARG(count), OV_ARG(points->xyz.memory),
+                             OV_ARG(points->pack_origins.memory), OV_ARG(w->memory),
                              OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
                              OV_ARG(terms->device.memory), OV_ARG(result->memory))));
 cleanup:
@@ -145,7 +148,7 @@ ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, cons
                          const ov_buffer *value, const ov_buffer *target, double limit,
                          ov_buffer *u, ov_buffer *sums) {
     ovoid_status status = OVOID_OK;
-    const cl_uint packs = (cl_uint)points->packs, count = (cl_uint)points->count;
+    const cl_uint packs = (cl_uint)points->packs;
     const cl_float single_limit = (cl_float)fmin(limit, FLT_MAX);
     ov_device *device;
     OV_TRY(ov_device_get(context, &device));
@@ -153,8 +156,9 @@ ovoid_status ov_residual(ovoid_context *context, ov_operations *operations, cons
     OV_TRY(reserve_values(context, points, u));
     OV_TRY(ov_buffer_reserve(context, sums, points->packs * 2 * sizeof(cl_float), "pack sums"));
     OV_TRY(OV_LAUNCH(context, &operations->residual, points->packs, ov_item_group(device),
-                     OV_ARG(packs), OV_ARG(count), OV_ARG(single_limit), OV_ARG(value->memory),
-                     OV_ARG(target->memory), OV_ARG(u->memory), OV_ARG(sums->memory)));
+                     OV_ARG(packs), OV_ARG(points->pack_origins.memory), OV_ARG(single_limit),
+                     OV_ARG(value->memory), OV_ARG(target->memory), OV_ARG(u->memory),
+                     OV_ARG(sums->memory)));
 cleanup:
     return status;
 }

@@ -6,7 +6,11 @@
 #include <string.h>
 
 #define BOX 6             /* low x, y, z, high x, y, z */
-#define CURVE_BITS_MAX 16 /* cells per axis of the curve, as a power of two */
+#define CURVE_BITS_MAX 21 /* cells per axis of the curve, as a power of two */
+/* Largest side of a pack's box, angstrom, or cells of the curve if that is more. Floats of points
+ * within half of it are good to 2.4e-7 angstrom. */
+#define PACK_SIDE 16.0
+#define PACK_CELLS 8.0
 
 static void empty_box(float box[BOX]) {
     for (int k = 0; k < 3; ++k) {
@@ -90,20 +94,23 @@ ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t c
     return OVOID_OK;
 }
 
-static void bounds_of(const float *xyz, size_t count, float box[BOX]) {
-    empty_box(box);
-    for (size_t k = 0; k < count; ++k) {
-        const float *const p = xyz + 3 * k;
-        const float one[BOX] = {p[0], p[1], p[2], p[0], p[1], p[2]};
-        widen_box(box, one);
+static void bounds_of(const double *xyz, size_t count, double box[BOX]) {
+    for (int k = 0; k < 3; ++k) {
+        box[k] = DBL_MAX;
+        box[k + 3] = -DBL_MAX;
+    }
+    for (size_t k = 0; k < 3 * count; ++k) {
+        double *const low = box + k % 3, *const high = low + 3;
+        *low = xyz[k] < *low ? xyz[k] : *low;
+        *high = xyz[k] > *high ? xyz[k] : *high;
     }
 }
 
 /* Cells of about `resolution`, but no more than the curve's bits can number. */
-static unsigned curve_bits(const float box[BOX], double resolution, double *cell) {
+static unsigned curve_bits(const double box[BOX], double resolution, double *cell) {
     double extent = 0.0;
     for (int k = 0; k < 3; ++k)
-        extent = fmax(extent, (double)box[k + 3] - box[k]);
+        extent = fmax(extent, box[k + 3] - box[k]);
     unsigned bits = 1;
     while (bits < CURVE_BITS_MAX && ldexp(resolution, (int)bits) < extent)
         ++bits;
@@ -111,20 +118,19 @@ static unsigned curve_bits(const float box[BOX], double resolution, double *cell
     return bits;
 }
 
-static ovoid_status order_points(ovoid_context *context, const float *xyz, size_t count,
+static ovoid_status order_points(ovoid_context *context, const double *xyz, size_t count,
                                  double resolution, uint32_t *order) {
     uint64_t *const keys = ov_alloc(context, count, sizeof *keys, "curve positions");
     if (!keys)
         return OVOID_ERROR_MEMORY;
-    float box[BOX];
-    double cell;
+    double box[BOX], cell;
     bounds_of(xyz, count, box);
     const unsigned bits = curve_bits(box, resolution, &cell);
     const uint32_t last = (1u << bits) - 1;
     for (size_t k = 0; k < count; ++k) {
         uint32_t at[3];
         for (int axis = 0; axis < 3; ++axis) {
-            const double position = ((double)xyz[3 * k + (size_t)axis] - box[axis]) / cell + 0.5;
+            const double position = (xyz[3 * k + (size_t)axis] - box[axis]) / cell + 0.5;
             at[axis] = position < last ? (uint32_t)position : last;
         }
         keys[k] = ov_hilbert_index(at[0], at[1], at[2], bits);
@@ -145,58 +151,165 @@ void ov_pack_box(const float *pack, float box[BOX]) {
     }
 }
 
-/* Fills packed with the points in pack order and leaves with the packs' boxes. */
-static void pack_points(const float *xyz, const ov_points *points, float *packed, float *leaves) {
-    for (size_t pack = 0; pack < points->packs; ++pack) {
-        float *const own = packed + pack * (3 * OV_PACK);
-        for (size_t j = 0; j < OV_PACK; ++j) {
-            const size_t k = pack * OV_PACK + j;
-            const uint32_t from = points->order[k < points->count ? k : points->count - 1];
-            const float *const p = xyz + 3 * (size_t)from;
-            for (size_t axis = 0; axis < 3; ++axis)
-                own[axis * OV_PACK + j] = p[axis];
-        }
-        ov_pack_box(own, leaves + pack * BOX);
-    }
+/* The float next to x that is not above it, or not below it. */
+static float round_down(double x) {
+    const float nearest = ov_to_float(x);
+    return (double)nearest > x ? nextafterf(nearest, -INFINITY) : nearest;
 }
 
-ovoid_status ov_points_upload(ovoid_context *context, const float *packed, const float *leaves,
-                              ov_points *points) {
+static float round_up(double x) {
+    return -round_down(-x);
+}
+
+/* The packs' boxes about points->origin, low x, y, z, high x, y, z, rounded outwards. Sets by how
+ * much at most they and the floats of nearby centres are off, each half a unit in the last place or
+ * one. */
+static void box_packs(const float *packed, ov_points *points, float *leaves) {
+    float largest = 0.0f;
+    for (size_t pack = 0; pack < points->packs; ++pack) {
+        float *const leaf = leaves + pack * BOX;
+        ov_pack_box(packed + pack * (3 * OV_PACK), leaf);
+        for (size_t k = 0; k < BOX; ++k) {
+            const double side = (double)points->pack_origin[4 * pack + k % 3] + (double)leaf[k];
+            leaf[k] = k < 3 ? round_down(side) : round_up(side);
+            largest = fabsf(leaf[k]) > largest ? fabsf(leaf[k]) : largest;
+        }
+    }
+    points->rounding = 2.0f * FLT_EPSILON * largest;
+}
+
+ovoid_status ov_points_upload(ovoid_context *context, const float *packed, ov_points *points) {
     ovoid_status status = OVOID_OK;
     float *boxes = NULL;
     size_t floats = 0;
     const size_t bytes = points->packs * 3 * OV_PACK * sizeof *packed;
+    float *const leaves = ov_alloc(context, points->packs * BOX, sizeof *leaves, "boxes of packs");
+    if (!leaves)
+        return OVOID_ERROR_MEMORY;
+    box_packs(packed, points, leaves);
     OV_TRY(ov_tree_build(context, leaves, points->packs, &points->tree, &boxes, &floats));
     OV_TRY(ov_buffer_put(context, &points->xyz, packed, bytes, "points"));
+    OV_TRY(ov_buffer_put(context, &points->pack_origins, points->pack_origin,
+                         points->packs * 4 * sizeof *points->pack_origin, "origins of packs"));
     OV_TRY(ov_buffer_put(context, &points->boxes, boxes, floats * sizeof *boxes, "boxes of packs"));
 cleanup:
+    free(leaves);
     free(boxes);
     return status;
 }
 
-ovoid_status ov_points_create(ovoid_context *context, const float *xyz, size_t count,
-                              const double origin[3], double resolution, ov_points *points) {
-    ovoid_status status = OVOID_OK;
-    float *packed = NULL, *leaves = NULL;
-    ov_points made = {.count = count, .packs = (count + OV_PACK - 1) / OV_PACK};
-    memcpy(made.origin, origin, sizeof made.origin);
-    if (count > UINT32_MAX - OV_PACK)
-        return ov_fail(context, OVOID_ERROR_LIMIT, "%zu points are more than 2^32", count);
+/* Largest side of a pack's box. */
+static double longest_side(double resolution) {
+    return fmax(PACK_SIDE, PACK_CELLS * resolution);
+}
 
-    made.order = ov_alloc(context, count, sizeof *made.order, "the order of the points");
-    packed = ov_alloc(context, made.packs * 3 * OV_PACK, sizeof *packed, "packed points");
-    leaves = ov_alloc(context, made.packs * BOX, sizeof *leaves, "boxes of packs");
-    if (!made.order || !packed || !leaves) {
+double ov_points_pack_reach(double resolution) {
+    return 0.51 * longest_side(resolution); /* the origin is rounded */
+}
+
+/* Grows the box about another point, unless that makes a side of it longer than `longest`. */
+static bool take_into(double box[BOX], const double *p, double longest) {
+    double grown[BOX];
+    for (int k = 0; k < 3; ++k) {
+        grown[k] = p[k] < box[k] ? p[k] : box[k];
+        grown[k + 3] = p[k] > box[k + 3] ? p[k] : box[k + 3];
+        if (grown[k + 3] - grown[k] > longest)
+            return false;
+    }
+    memcpy(box, grown, sizeof grown);
+    return true;
+}
+
+/* Points along the curve, and the pack that begins at `first` of them. */
+typedef struct cutter {
+    const double *xyz;
+    const uint32_t *curve;
+    size_t count;
+    double longest; /* side of a pack's box */
+} cutter;
+
+/* Points in the pack, and its box. */
+static size_t cut_pack(const cutter *c, size_t first, double box[BOX]) {
+    const double *const p = c->xyz + 3 * (size_t)c->curve[first];
+    size_t size = 1;
+    memcpy(box, p, 3 * sizeof *p);
+    memcpy(box + 3, p, 3 * sizeof *p);
+    while (size < OV_PACK && first + size < c->count &&
+           take_into(box, c->xyz + 3 * (size_t)c->curve[first + size], c->longest))
+        ++size;
+    return size;
+}
+
+static size_t count_packs(const cutter *c) {
+    double box[BOX];
+    size_t packs = 0;
+    for (size_t first = 0; first < c->count; first += cut_pack(c, first, box))
+        ++packs;
+    return packs;
+}
+
+/* Fills packed with the points along the curve, pack by pack, each pack about the middle of its
+ * box. */
+static void pack_points(const cutter *c, ov_points *points, float *packed) {
+    size_t first = 0;
+    for (size_t pack = 0; pack < points->packs; ++pack) {
+        double box[BOX];
+        float *const own = packed + pack * (3 * OV_PACK), *const base =
+                                                              points->pack_origin + 4 * pack;
+        const size_t size = cut_pack(c, first, box);
+        for (int k = 0; k < 3; ++k)
+            base[k] = ov_to_float(0.5 * box[k] + 0.5 * box[k + 3] - points->origin[k]);
+        base[3] = (float)size;
+        for (size_t j = 0; j < OV_PACK; ++j) {
+            const uint32_t from = c->curve[first + (j < size ? j : size - 1)];
+            points->order[pack * OV_PACK + j] = from;
+            for (size_t k = 0; k < 3; ++k)
+                own[k * OV_PACK + j] =
+                    (float)(c->xyz[3 * (size_t)from + k] - points->origin[k] - (double)base[k]);
+        }
+        first += size;
+    }
+}
+
+/* Cuts the curve into packs and uploads them. */
+static ovoid_status make_packs(ovoid_context *context, const cutter *c, ov_points *points) {
+    ovoid_status status = OVOID_OK;
+    points->packs = count_packs(c);
+    if (points->packs > UINT32_MAX / OV_PACK)
+        return ov_fail(context, OVOID_ERROR_LIMIT, "%zu packs of points are more than 2^28",
+                       points->packs);
+    const size_t size = points->packs * OV_PACK;
+    float *const packed = ov_alloc(context, 3 * size, sizeof *packed, "packed points");
+    points->order = ov_alloc(context, size, sizeof *points->order, "the order of the points");
+    points->pack_origin =
+        ov_alloc(context, points->packs * 4, sizeof *points->pack_origin, "origins of packs");
+    if (!packed || !points->order || !points->pack_origin) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    OV_TRY(order_points(context, xyz, count, resolution, made.order));
-    pack_points(xyz, &made, packed, leaves);
-    OV_TRY(ov_points_upload(context, packed, leaves, &made));
-
+    pack_points(c, points, packed);
+    OV_TRY(ov_points_upload(context, packed, points));
 cleanup:
     free(packed);
-    free(leaves);
+    return status;
+}
+
+ovoid_status ov_points_create(ovoid_context *context, const double *xyz, size_t count,
+                              const double origin[3], double resolution, ov_points *points) {
+    ovoid_status status = OVOID_OK;
+    ov_points made = {.count = count};
+    memcpy(made.origin, origin, sizeof made.origin);
+    if (count > UINT32_MAX - OV_PACK)
+        return ov_fail(context, OVOID_ERROR_LIMIT, "%zu points are more than 2^32", count);
+    uint32_t *const curve = ov_alloc(context, count, sizeof *curve, "the order of the points");
+    if (!curve)
+        return OVOID_ERROR_MEMORY;
+    const cutter c = {
+        .xyz = xyz, .curve = curve, .count = count, .longest = longest_side(resolution)};
+    OV_TRY(order_points(context, xyz, count, resolution, curve));
+    OV_TRY(make_packs(context, &c, &made));
+cleanup:
+    free(curve);
     if (status == OVOID_OK)
         *points = made;
     else
@@ -206,7 +319,9 @@ cleanup:
 
 void ov_points_destroy(ov_points *points) {
     free(points->order);
+    free(points->pack_origin);
     ov_buffer_destroy(&points->xyz);
+    ov_buffer_destroy(&points->pack_origins);
     ov_buffer_destroy(&points->boxes);
     memset(points, 0, sizeof *points);
 }

@@ -18,18 +18,18 @@ typedef struct sampler {
     const ov_lattice *lattice;
     ov_band band;
     ov_sampling sampling;
-    double origin[3]; /* of the kept points */
+    double origin[3]; /* of the samples */
     ov_piece_grid pieces;
     ov_points points; /* of one piece, relative to its corner */
     ov_terms terms;
     ov_lists lists;
     ov_operations operations;
-    ov_buffer value;
+    ov_buffer value, gradient;
     float *values;        /* of one piece */
     uint32_t *order;      /* its packs as bricks */
     ov_quadric *quadrics; /* of one piece's atoms */
     size_t quadrics_capacity;
-    float *kept;                      /* x, y, z relative to origin */
+    double *kept;                     /* x, y, z */
     size_t kept_count, kept_capacity; /* capacity in floats */
     size_t band_count;                /* of the kept points, those within [low, high] */
     uint64_t kept_limit;
@@ -65,6 +65,16 @@ ovoid_status ov_lattice_create(ovoid_context *context, const double *xyzr, size_
 /* Coordinate of lattice index i = 0 .. size - 1; the paper counts from 1. */
 static double coordinate(const ov_lattice *lattice, size_t axis, uint64_t i) {
     return lattice->low[axis] + (double)(i + 1) * lattice->step[axis];
+}
+
+static double resolution_of(const sampler *s) {
+    const double *const step = s->lattice->step;
+    return fmax(step[0], fmax(step[1], step[2]));
+}
+
+/* How far (angstrom) an atom's Gaussian reaches the cut-off. */
+static double reach_of(const sampler *s, double radius) {
+    return sqrt(radius * radius - log(OV_TARGET_CUTOFF) / s->decay);
 }
 
 /* The bricks of a piece, along a curve, as the tree over them wants it; the same for all pieces
@@ -178,8 +188,7 @@ static void keep_point(sampler *s, const uint64_t first[3], uint64_t j, float va
     if (!is_kept(s->band, value, index))
         return;
     for (size_t axis = 0; axis < 3; ++axis)
-        s->kept[3 * s->kept_count + axis] =
-            (float)(coordinate(s->lattice, axis, index[axis]) - s->origin[axis]);
+        s->kept[3 * s->kept_count + axis] = coordinate(s->lattice, axis, index[axis]);
     ++s->kept_count;
     s->band_count += value >= s->band.low && value <= s->band.high;
 }
@@ -244,25 +253,111 @@ static void drop_pieces(sampler *s) {
     ov_buffer_destroy(&s->value);
 }
 
+/* ---- phi and its gradient at the kept points ----------------------------------------------- */
+
+/* Packs at once: a quarter of a million points, so that their lists stay small however many there
+ * are. */
+#define SLICE ((size_t)1 << 14)
+
+/* The packs first .. first + points->packs - 1 of the samples, as points of their own. */
+static ovoid_status take_slice(ovoid_context *context, const ov_points *all, size_t first,
+                               ov_points *slice) {
+    ovoid_status status = OVOID_OK;
+    const size_t pack = 3 * OV_PACK * sizeof(float), packs = slice->packs;
+    float *const packed = ov_alloc(context, packs, pack, "packed points");
+    slice->pack_origin =
+        ov_alloc(context, packs * 4, sizeof *slice->pack_origin, "origins of packs");
+    if (!packed || !slice->pack_origin) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    memcpy(slice->origin, all->origin, sizeof all->origin);
+    memcpy(slice->pack_origin, all->pack_origin + 4 * first, packs * 4 * sizeof(float));
+    OV_TRY(ov_buffer_read(context, &all->xyz, first * pack, packed, packs * pack));
+    OV_TRY(ov_points_upload(context, packed, slice));
+cleanup:
+    free(packed);
+    return status;
+}
+
+/* The box about the packs of a slice, whose points are within `reach` of their packs' origins. */
+static void bound_slice(const ov_points *slice, double reach, double low[3], double high[3]) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+        low[axis] = INFINITY;
+        high[axis] = -INFINITY;
+        for (size_t pack = 0; pack < slice->packs; ++pack) {
+            const double at = slice->origin[axis] + (double)slice->pack_origin[4 * pack + axis];
+            low[axis] = at < low[axis] ? at : low[axis];
+            high[axis] = at > high[axis] ? at : high[axis];
+        }
+        low[axis] -= reach;
+        high[axis] += reach;
+    }
+}
+
+/* The Gaussians of the atoms that may reach the slice, as terms. */
+static ovoid_status set_slice_terms(ovoid_context *context, sampler *s, const ov_points *slice) {
+    double low[3], high[3];
+    size_t count = 0;
+    ovoid_status status = ov_grow(context, &s->quadrics, &s->quadrics_capacity, s->atoms,
+                                  sizeof *s->quadrics, "atoms");
+    if (status != OVOID_OK)
+        return status;
+    bound_slice(slice, ov_points_pack_reach(resolution_of(s)), low, high);
+    for (size_t i = 0; i < s->atoms; ++i) {
+        const double *const a = s->xyzr + 4 * i;
+        const double reach = reach_of(s, a[3]);
+        bool near = true;
+        for (size_t axis = 0; axis < 3; ++axis)
+            near = near && a[axis] >= low[axis] - reach && a[axis] <= high[axis] + reach;
+        if (near)
+            ov_quadric_of_atom(a, s->decay, &s->quadrics[count++]);
+    }
+    return ov_terms_set(context, &s->terms, s->quadrics, count, slice->origin, OV_TARGET_CUTOFF);
+}
+
+/* Evaluates the slice that begins at pack `first` and puts it where it belongs. */
+static ovoid_status finish_slice(ovoid_context *context, sampler *s, ov_samples *samples,
+                                 size_t first, float *results) {
+    ovoid_status status = OVOID_OK;
+    const size_t left = samples->points.packs - first, packs = left < SLICE ? left : SLICE;
+    const size_t values = packs * OV_PACK * sizeof *results, at = first * OV_PACK * sizeof *results;
+    ov_points slice = {.count = packs * OV_PACK, .packs = packs};
+    OV_TRY(take_slice(context, &samples->points, first, &slice));
+    OV_TRY(set_slice_terms(context, s, &slice));
+    OV_TRY(ov_lists_build(context, &s->lists, &slice, &s->terms, 0.0));
+    OV_TRY(ov_field_gradient(context, &s->operations, &slice, &s->terms, &s->lists, &s->value,
+                             &s->gradient));
+    OV_TRY(ov_buffer_read(context, &s->value, 0, results, values));
+    OV_TRY(ov_buffer_write(context, &samples->value, at, results, values));
+    OV_TRY(ov_buffer_read(context, &s->gradient, 0, results, 3 * values));
+    OV_TRY(ov_buffer_write(context, &samples->gradient, 3 * at, results, 3 * values));
+cleanup:
+    ov_points_destroy(&slice);
+    return status;
+}
+
 /* phi and its gradient once more at the kept points, with the rounding that a fit will see. */
 static ovoid_status finish_samples(ovoid_context *context, sampler *s, ov_samples *samples) {
     ovoid_status status = OVOID_OK;
-    const double *const step = s->lattice->step;
-    OV_TRY(ov_points_create(context, s->kept, s->kept_count, s->origin,
-                            fmax(step[0], fmax(step[1], step[2])), &samples->points));
+    float *results = NULL;
+    OV_TRY(ov_points_create(context, s->kept, s->kept_count, s->origin, resolution_of(s),
+                            &samples->points));
     free(samples->points.order); /* nobody asks which of the lattice's points they are */
     samples->points.order = NULL;
     drop_pieces(s);
-    OV_TRY(ov_grow(context, &s->quadrics, &s->quadrics_capacity, s->atoms, sizeof *s->quadrics,
-                   "atoms"));
-    for (size_t i = 0; i < s->atoms; ++i)
-        ov_quadric_of_atom(s->xyzr + 4 * i, s->decay, &s->quadrics[i]);
-    OV_TRY(ov_terms_set(context, &s->terms, s->quadrics, s->atoms, s->origin, OV_TARGET_CUTOFF));
-    OV_TRY(ov_lists_build(context, &s->lists, &samples->points, &s->terms, 0.0));
-    OV_TRY(ov_field_gradient(context, &s->operations, &samples->points, &s->terms, &s->lists,
-                             &samples->value, &samples->gradient));
-    OV_TRY(ov_finish(context));
+    const size_t values = samples->points.packs * OV_PACK * sizeof(float);
+    OV_TRY(ov_buffer_reserve(context, &samples->value, values, "values at points"));
+    OV_TRY(ov_buffer_reserve(context, &samples->gradient, 3 * values, "gradients at points"));
+    results = ov_alloc(context, SLICE * 3 * OV_PACK, sizeof *results, "values at points");
+    if (!results)
+        OV_TRY(OVOID_ERROR_MEMORY);
+    for (size_t first = 0; first < samples->points.packs; first += SLICE) {
+        OV_TRY(finish_slice(context, s, samples, first, results));
+        OV_TRY(ask_to_go_on(context, s));
+    }
 cleanup:
+    free(results);
     return status;
 }
 
@@ -274,6 +369,7 @@ static void destroy_sampler(sampler *s) {
     ov_terms_destroy(&s->terms);
     ov_lists_destroy(&s->lists);
     ov_operations_destroy(&s->operations);
+    ov_buffer_destroy(&s->gradient);
 }
 
 ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms, double decay,

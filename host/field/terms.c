@@ -42,11 +42,20 @@ static bool is_positive_definite(const double a[6]) {
 static bool to_term(const ov_quadric *quadric, const double origin[3], double log2_cutoff,
                     ov_term *term) {
     const double log2_amplitude = log2(quadric->amplitude);
+    double centre[3];
+    float rounded[3];
+    for (int k = 0; k < 3; ++k) {
+        centre[k] = quadric->centre[k] - origin[k];
+        rounded[k] = ov_to_float(centre[k]);
+    }
     *term = (ov_term){
         .log2_amplitude = (float)log2_amplitude,
-        .x = (float)(quadric->centre[0] - origin[0]),
-        .y = (float)(quadric->centre[1] - origin[1]),
-        .z = (float)(quadric->centre[2] - origin[2]),
+        .x = rounded[0],
+        .y = rounded[1],
+        .z = rounded[2],
+        .rest_x = (float)(centre[0] - (double)rounded[0]),
+        .rest_y = (float)(centre[1] - (double)rounded[1]),
+        .rest_z = (float)(centre[2] - (double)rounded[2]),
         .xx = (float)(LOG2_E * quadric->a[0]),
         .xy = (float)(2.0 * LOG2_E * quadric->a[1]),
         .xz = (float)(2.0 * LOG2_E * quadric->a[2]),

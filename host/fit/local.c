@@ -62,23 +62,24 @@ static ovoid_status keep_packs(ov_local *l, const ov_points *points, size_t kept
     ovoid_context *const context = l->refiner.context;
     const size_t size = 3 * OV_PACK;
     float *const packed = ov_alloc(context, points->packs * size, sizeof *packed, "points");
-    float *const leaves = ov_alloc(context, kept * 6, sizeof *leaves, "boxes of packs");
-    if (!packed || !leaves) {
+    float *const origins = ov_alloc(context, kept * 4, sizeof *origins, "origins of packs");
+    free(l->points.pack_origin);
+    l->points.pack_origin = origins;
+    if (!packed || !origins) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
     OV_TRY(ov_buffer_read(context, &points->xyz, 0, packed, points->packs * size * sizeof *packed));
     for (size_t n = 0; n < kept; ++n) {
         memmove(packed + n * size, packed + l->packs[n] * size, size * sizeof *packed);
-        ov_pack_box(packed + n * size, leaves + 6 * n);
+        memcpy(origins + 4 * n, points->pack_origin + 4 * (size_t)l->packs[n], 4 * sizeof *origins);
     }
     l->points.packs = kept;
     l->points.count = kept * OV_PACK;
     memcpy(l->points.origin, points->origin, sizeof points->origin);
-    OV_TRY(ov_points_upload(context, packed, leaves, &l->points));
+    OV_TRY(ov_points_upload(context, packed, &l->points));
 cleanup:
     free(packed);
-    free(leaves);
     return status;
 }
 

@@ -74,7 +74,9 @@ ovoid_status ov_target_window(ovoid_context *context, ov_target *target, double 
     const size_t count = target->points->packs * OV_PACK;
     target->options.window = window;
     target->options.floor = floor;
-    for (size_t k = 0; k < target->points->count; ++k) {
+    for (size_t k = 0; k < count; ++k) {
+        if (ov_points_fill(target->points, k))
+            continue; /* its weight is 0 */
         const double root = root_weight(target, target->phi[k], target->slope[k]);
         target->host_weight[k] = (float)(root * root);
     }
@@ -99,8 +101,9 @@ ovoid_status ov_target_create(ovoid_context *context, const ov_samples *samples,
     }
     OV_TRY(
         read_samples(context, samples, options->slope_min * isovalue * sqrt(2.0 * decay), &made));
-    for (size_t k = 0; k < samples->points.count; ++k)
-        set_bounds(&made, k);
+    for (size_t k = 0; k < count; ++k)
+        if (!ov_points_fill(&samples->points, k))
+            set_bounds(&made, k);
     OV_TRY(ov_buffer_put(context, &made.low, made.host_low, count * sizeof(float),
                          "targets at points"));
     OV_TRY(ov_buffer_put(context, &made.high, made.host_high, count * sizeof(float),
@@ -126,12 +129,6 @@ cleanup:
     return status;
 }
 
-static void point_of(const ov_points *points, const float *xyz, size_t k, double at[3]) {
-    const float *const p = xyz + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
-    for (size_t axis = 0; axis < 3; ++axis)
-        at[axis] = points->origin[axis] + (double)p[axis * OV_PACK];
-}
-
 /* The middle of a pack's box; returns the half of its diagonal. */
 static double middle_of(const ov_points *points, const float *xyz, size_t pack, double middle[3]) {
     float box[6];
@@ -139,7 +136,8 @@ static double middle_of(const ov_points *points, const float *xyz, size_t pack, 
     ov_pack_box(xyz + pack * (3 * OV_PACK), box);
     for (int axis = 0; axis < 3; ++axis) {
         const double low = box[axis], high = box[axis + 3];
-        middle[axis] = points->origin[axis] + 0.5 * (low + high);
+        middle[axis] = points->origin[axis] + (double)points->pack_origin[4 * pack + (size_t)axis] +
+                       0.5 * (low + high);
         square += (high - low) * (high - low);
     }
     return 0.5 * sqrt(square);
@@ -166,7 +164,7 @@ static void emphasise(ov_target *target, const float *xyz, const ov_grid *grid, 
             ov_grid_near(wide, at, UINT32_MAX, near) == 0)
             continue;
         for (size_t k = pack * OV_PACK; k < (pack + 1) * OV_PACK; ++k) {
-            point_of(points, xyz, k, at);
+            ov_points_at(points, xyz, k, at);
             if (ov_grid_near(grid, at, UINT32_MAX, near) > 0)
                 emphasise_point(target, k, factor);
         }

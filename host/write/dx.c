@@ -7,10 +7,10 @@ typedef struct writer {
     uint64_t written;
 } writer;
 
-static void take_values(const double *values, size_t count, void *user) {
+static void take_values(const float *values, size_t count, void *user) {
     writer *w = user;
     for (size_t k = 0; k < count && !ferror(w->stream); k++)
-        fprintf(w->stream, "%.6e%c", values[k], ++w->written % 3 ? ' ' : '\n');
+        fprintf(w->stream, "%.6e%c", (double)values[k], ++w->written % 3 ? ' ' : '\n');
 }
 
 static void write_head(const ov_map *map, FILE *stream) {

@@ -14,17 +14,18 @@ typedef struct format {
     const char *extensions;
     void (*ellipsoids)(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
     ovoid_status (*map)(ovoid_context *context, const ov_map *map, FILE *stream);
+    int bytes; /* of a map's value */
 } format;
 
 static const format formats[] = {
-    [OVOID_EXPORT_AUTO] = {"", "", NULL, NULL},
-    [OVOID_EXPORT_BILD] = {"bild", ".bild .bld", ov_write_bild, NULL},
-    [OVOID_EXPORT_CXC] = {"cxc", ".cxc", ov_write_cxc, NULL},
-    [OVOID_EXPORT_PYMOL] = {"pymol", ".py", ov_write_pymol, NULL},
-    [OVOID_EXPORT_GMM] = {"gmm", ".gmm", ov_write_gmm, NULL},
-    [OVOID_EXPORT_JSON] = {"json", ".json", ov_write_json, NULL},
-    [OVOID_EXPORT_CCP4] = {"ccp4", ".mrc .map .ccp4", NULL, ov_write_ccp4},
-    [OVOID_EXPORT_DX] = {"dx", ".dx", NULL, ov_write_dx},
+    [OVOID_EXPORT_AUTO] = {"", "", NULL, NULL, 0},
+    [OVOID_EXPORT_BILD] = {"bild", ".bild .bld", ov_write_bild, NULL, 0},
+    [OVOID_EXPORT_CXC] = {"cxc", ".cxc", ov_write_cxc, NULL, 0},
+    [OVOID_EXPORT_PYMOL] = {"pymol", ".py", ov_write_pymol, NULL, 0},
+    [OVOID_EXPORT_GMM] = {"gmm", ".gmm", ov_write_gmm, NULL, 0},
+    [OVOID_EXPORT_JSON] = {"json", ".json", ov_write_json, NULL, 0},
+    [OVOID_EXPORT_CCP4] = {"ccp4", ".mrc .map .ccp4", NULL, ov_write_ccp4, 4},
+    [OVOID_EXPORT_DX] = {"dx", ".dx", NULL, ov_write_dx, 13},
 };
 enum { FORMATS = sizeof formats / sizeof *formats };
 
@@ -48,8 +49,10 @@ ovoid_export_format ovoid_export_format_find(const char *name) {
 }
 
 void ovoid_export_options_init(ovoid_export_options *options) {
-    *options = (ovoid_export_options){
-        .spacing = OVOID_DEFAULT_MESH_SPACING, .colour = {0.30, 0.55, 0.80}, .opacity = 1.0};
+    *options = (ovoid_export_options){.spacing = OVOID_DEFAULT_MESH_SPACING,
+                                      .colour = {0.30, 0.55, 0.80},
+                                      .opacity = 1.0,
+                                      .max_gigabytes = OVOID_DEFAULT_MAP_GIGABYTES};
 }
 
 static bool is_share(double value) {
@@ -65,6 +68,9 @@ static ovoid_status check_options(ovoid_context *context, const ovoid_export_opt
     if (!(o->spacing > 0.0 && o->spacing <= 1000.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "spacing %g is not above 0 and at most 1000 angstrom", o->spacing);
+    if (!(o->max_gigabytes > 0.0))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "a map of at most %g gigabytes is none",
+                       o->max_gigabytes);
     if (!is_share(o->colour[0]) || !is_share(o->colour[1]) || !is_share(o->colour[2]) ||
         !is_share(o->opacity))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
@@ -77,10 +83,14 @@ static ovoid_status check_options(ovoid_context *context, const ovoid_export_opt
 static ovoid_status choose_format(ovoid_context *context, const char *path,
                                   const ovoid_export_options *options, bool model,
                                   const format **chosen) {
-    ovoid_export_format which = options->format;
-    if (which == OVOID_EXPORT_AUTO)
-        which = ovoid_export_format_find(ov_extension(path));
+    const ovoid_export_format named = ovoid_export_format_find(ov_extension(path));
+    const ovoid_export_format which = options->format ? options->format : named;
     *chosen = &formats[which];
+    if (named != OVOID_EXPORT_AUTO && named != which)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "%s is asked for, but the name '%s' says %s: other programs go by the name, "
+                       "so change one of the two",
+                       formats[which].name, path, formats[named].name);
     if (which == OVOID_EXPORT_AUTO && strcmp(path, "-") == 0)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "standard output does not say what to write: name a format");
@@ -119,6 +129,18 @@ cleanup:
     return status;
 }
 
+static ovoid_status check_size(ovoid_context *context, const ov_map *map, int bytes,
+                               double max_gigabytes) {
+    const double gigabytes = 1e-9 * (double)bytes * (double)ov_map_points(map);
+    if (gigabytes <= max_gigabytes)
+        return OVOID_OK;
+    return ov_fail(context, OVOID_ERROR_LIMIT,
+                   "the map would have %llu points (%ld x %ld x %ld) and take %.3g GB, more than "
+                   "%g GB: choose a larger spacing, or allow more (max-gigabytes)",
+                   (unsigned long long)ov_map_points(map), (long)map->size[0], (long)map->size[1],
+                   (long)map->size[2], gigabytes, max_gigabytes);
+}
+
 /* The map of these quadrics. */
 static ovoid_status write_map(ovoid_context *context, const char *path, const format *chosen,
                               const ovoid_export_options *options, double isovalue,
@@ -130,6 +152,8 @@ static ovoid_status write_map(ovoid_context *context, const char *path, const fo
                   .user = options->user};
     snprintf(map.label, sizeof map.label, "%s", label);
     ovoid_status status = ov_map_cover(context, &map, isovalue);
+    if (status == OVOID_OK)
+        status = check_size(context, &map, chosen->bytes, options->max_gigabytes);
     return status == OVOID_OK ? write_file(context, path, chosen, NULL, NULL, &map) : status;
 }
 

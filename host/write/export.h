@@ -65,7 +65,7 @@ ovoid_status ov_map_cover(ovoid_context *context, ov_map *map, double isovalue);
 uint64_t ov_map_points(const ov_map *map);
 
 /* Takes the next values of a map. */
-typedef void (*ov_map_sink)(const double *values, size_t count, void *user);
+typedef void (*ov_map_sink)(const float *values, size_t count, void *user);
 
 /* Computes the field piece by piece, fast[0] the axis that runs fastest, fast[2] slowest, until all
  * is done, a write to `stream` fails, or the map's progress function says stop. */

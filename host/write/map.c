@@ -11,27 +11,12 @@
 /* 32 GiB of floats. */
 #define MOST_POINTS ((double)((uint64_t)1 << 33))
 
-/* Half the widths of the box about the region where the Gaussian is at least `floor`: a plane with
- * normal n touches z^T A z = q at sqrt(q n^T A^-1 n). */
-static void reach(const ov_quadric *quadric, double floor, double half[3]) {
-    const double *a = quadric->a; /* xx, xy, xz, yy, yz, zz */
-    const double cofactor[3] = {a[3] * a[5] - a[4] * a[4], a[0] * a[5] - a[2] * a[2],
-                                a[0] * a[3] - a[1] * a[1]};
-    const double determinant = a[0] * cofactor[0] + a[1] * (a[2] * a[4] - a[1] * a[5]) +
-                               a[2] * (a[1] * a[4] - a[2] * a[3]);
-    const double q = log(quadric->amplitude / floor);
-    for (int axis = 0; axis < 3; axis++) {
-        const double square = q * cofactor[axis] / determinant;
-        half[axis] = square > 0.0 ? sqrt(square) : 0.0;
-    }
-}
-
 ovoid_status ov_map_cover(ovoid_context *context, ov_map *map, double isovalue) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     double points = 1.0;
     for (size_t i = 0; i < map->count; i++) {
-        double half[3];
-        reach(&map->quadrics[i], isovalue / 100.0, half);
+        double half[3] = {0.0, 0.0, 0.0};
+        ov_quadric_reach(&map->quadrics[i], isovalue / 100.0, half);
         for (int axis = 0; axis < 3; axis++) {
             low[axis] = fmin(low[axis], map->quadrics[i].centre[axis] - half[axis]);
             high[axis] = fmax(high[axis], map->quadrics[i].centre[axis] + half[axis]);
@@ -81,19 +66,22 @@ ovoid_status ov_map_run(ovoid_context *context, const ov_map *map, const int fas
     const uint64_t total = ov_map_points(map);
     const size_t piece = total < PIECE ? (size_t)total : PIECE;
     double *xyz = ov_alloc(context, 3 * piece, sizeof *xyz, "a map's points");
-    double *values = ov_alloc(context, piece, sizeof *values, "a map's values");
+    float *values = ov_alloc(context, piece, sizeof *values, "a map's values");
+    ov_evaluator evaluator = {0};
     if (!xyz || !values)
         OV_TRY(OVOID_ERROR_MEMORY);
+    OV_TRY(ov_evaluator_create(context, map->quadrics, map->count, &evaluator));
     for (uint64_t first = 0; first < total && !ferror(stream); first += piece) {
         const size_t count = total - first < piece ? (size_t)(total - first) : piece;
         place_points(map, fast, first, count, xyz);
-        OV_TRY(ov_evaluate(context, map->quadrics, map->count, xyz, count, values, NULL));
+        OV_TRY(ov_evaluator_run(context, &evaluator, xyz, count, values, NULL));
         sink(values, count, user);
         if (!ferror(stream) && map->progress && !map->progress(first + count, total, map->user))
             OV_TRY(ov_fail(context, OVOID_ERROR_CANCELLED, "the export was cancelled"));
     }
 
 cleanup:
+    ov_evaluator_destroy(&evaluator);
     free(xyz);
     free(values);
     return status;

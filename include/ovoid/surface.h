@@ -180,16 +180,22 @@ typedef struct ovoid_export_options {
     double spacing;                    /* of a map, angstrom; its points are multiples of it */
     double colour[3];                  /* red, green, blue from 0 to 1, of drawn ellipsoids */
     double opacity;                    /* from 0 to 1, of drawn ellipsoids */
+    double max_gigabytes;              /* a map that would take more (1e9 bytes each) is refused */
     ovoid_export_progress_fn progress; /* may be NULL; maps alone ask it */
     void *user;
 } ovoid_export_options;
 
-/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue. */
+#define OVOID_DEFAULT_MAP_GIGABYTES 1.0
+
+/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue, maps of up
+ * to OVOID_DEFAULT_MAP_GIGABYTES. */
 OVOID_API void ovoid_export_options_init(ovoid_export_options *options);
 
 /* Writes a file for another program, whole or not at all; "-" is standard output and needs a
- * format. options may be NULL. A map is computed on the device and written piece by piece: memory
- * does not grow with it. */
+ * format. options may be NULL. OVOID_ERROR_ARGUMENT where the path's extension stands for another
+ * format than the options name. A map is computed on the device and written piece by piece: memory
+ * does not grow with it; OVOID_ERROR_LIMIT, before anything is computed, where it would take more
+ * than max_gigabytes. */
 OVOID_API ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model,
                                           const char *path, const ovoid_export_options *options);
 

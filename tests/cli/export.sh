@@ -68,6 +68,11 @@ wrong 2 "name a format" m.ovoid -o -
 wrong 2 "--as takes bild, cxc, pymol, gmm, json, ccp4 or dx, not 'pdb'" m.ovoid -o - --as pdb
 wrong 2 "--colour takes six hexadecimal digits such as 4d8ccc, not 'red'" m.ovoid -o m.py --color red
 wrong 2 "--opacity is 2, but must be at most 1" m.ovoid -o m.py --opacity 2
+for name in r.mrc r.MRC r.dx r.py; do
+    wrong 2 "json is asked for, but the name '$name' says" m.ovoid -o $name --as json
+done
+wrong 2 "dx is asked for, but the name 'r.map' says ccp4" a.xyzr -o r.map --as dx
+wrong 2 "--max-gigabytes is 0, but must be above 0" m.ovoid -o m.mrc --max-gigabytes 0
 wrong 2 "--spacing is 0, but must be above 0" m.ovoid -o m.mrc --spacing 0
 wrong 2 "did you mean '--spacing'?" m.ovoid -o m.mrc --spcing 1
 wrong 2 "a molecule has no ellipsoids" a.xyzr -o a.py
@@ -86,6 +91,20 @@ fi
 need_device
 wrong 5 "no such device" a.xyzr -o a.mrc --device "no such device"
 wrong 6 "choose a larger spacing" a.xyzr -o a.mrc --spacing 1e-5
+# A map that would be mostly nothing is not written without a word: its size is named.
+printf '0 0 0 1.5\n1e6 0 0 1.5\n' >far.xyzr
+"$OVOID" export far.xyzr -o far.mrc >"$out" 2>"$err"
+code=$?
+expect_code 6
+expect_err "take 2.31 GB, more than 1 GB: choose a larger spacing, or allow more (max-gigabytes)"
+[ ! -e far.mrc ] || fail "a map over the limit should not be written"
+"$OVOID" export far.xyzr -o far.mrc --spacing 20 --max-gigabytes 1e-3 >"$out" 2>"$err"
+code=$?
+expect_code 6
+"$OVOID" export far.xyzr -o far.mrc --spacing 20 --max-gigabytes 1e-2 >"$out" 2>"$err"
+code=$?
+expect_code 0
+rm -f far.xyzr far.mrc
 for name in a.mrc a.map a.ccp4 a.dx; do
     run "$OVOID" export a.xyzr -o $name --spacing 1 --decay 0.4
     expect_code 0
@@ -114,7 +133,7 @@ tail -c $((size - 1024)) c.mrc | cmp -s - a.values || fail "the values should be
 rm -f a.mrc a.map a.ccp4 a.dx b.mrc c.mrc a.values
 env --default-signal=INT true 2>/dev/null || skip "env cannot reset signals"
 last="ovoid export a.xyzr -o a.dx --spacing 0.01, then SIGINT"
-env --default-signal=INT "$OVOID" export a.xyzr -o a.dx --spacing 0.01 >"$out" 2>"$err" &
+env --default-signal=INT "$OVOID" export a.xyzr -o a.dx --spacing 0.01 --max-gigabytes 1e3 >"$out" 2>"$err" &
 pid=$!
 await_writing
 kill -s INT $pid

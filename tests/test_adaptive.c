@@ -515,11 +515,11 @@ static void a_stopped_fit_hands_over_nothing(void **state) {
         memset(&untouched, 0x5a, sizeof untouched);
         result = untouched;
         options.adaptive.effort = 2;
-        options.progress = stop_there;
-        options.user = &s;
+        ovoid_context_on_progress(*state, stop_there, &s);
         print_message("stopped at %s %u\n", cases[n].stage, cases[n].count);
         test_refused(*state, ovoid_fit(*state, molecule, &options, &model, &result),
                      OVOID_ERROR_CANCELLED, "stopped");
+        ovoid_context_on_progress(*state, NULL, NULL);
         assert_ptr_equal(model, nothing);
         assert_memory_equal(&result, &untouched, sizeof result);
     }

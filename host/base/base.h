@@ -15,6 +15,11 @@ struct ovoid_context {
     char *error; /* last failure, owned, may be NULL */
     ovoid_warning_fn warn;
     void *warn_user;
+    ovoid_progress_fn progress; /* base/progress.h */
+    void *progress_user;
+    ovoid_progress now;                    /* what it is told, but for the seconds */
+    double began;                          /* the outermost work, in ov_seconds() */
+    unsigned works;                        /* public functions at work, one within the other */
     bool profile;                          /* devices begin with their launches counted */
     struct ov_device *device;              /* NULL until opened */
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */

@@ -1,7 +1,11 @@
 #include "base/file.h"
 
+#include "base/progress.h"
+#include "base/temporary.h"
+
 #include <errno.h>
 #include <fcntl.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -117,21 +121,22 @@ static ovoid_status fail_folder(ovoid_context *context, const char *path, const 
 /* Makes an empty file of a name that nobody has, in the folder of target->path. */
 static ovoid_status temporary_create(ovoid_context *context, const char *path,
                                      const ov_target *target, int *descriptor, char **name) {
-    static unsigned counter; /* a clash between threads only costs another try */
+    static atomic_uint counter;
     char last[64];
     for (int i = 0; i < NAME_TRIES; i++) {
         struct timespec now;
         clock_gettime(CLOCK_REALTIME, &now);
-        snprintf(last, sizeof last, ".ovoid-%ld-%u-%lx.tmp", (long)getpid(), counter++,
-                 (unsigned long)now.tv_nsec);
+        snprintf(last, sizeof last, ".ovoid-%ld-%u-%lx.tmp", (long)getpid(),
+                 atomic_fetch_add(&counter, 1), (unsigned long)now.tv_nsec);
         *name = join(context, target->path, folder_length(target->path), last);
         if (!*name)
             return OVOID_ERROR_MEMORY;
+        ov_temporary_begin(*name); /* before it is there */
         *descriptor = open(*name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOCTTY, 0666);
         if (*descriptor >= 0)
             return OVOID_OK;
         int error = errno;
-        free(*name);
+        ov_temporary_end(*name);
         *name = NULL;
         if (error != EEXIST)
             return fail_folder(context, path, target->path, error);
@@ -179,7 +184,7 @@ cleanup:
         close(descriptor);
     if (status != OVOID_OK && made.temporary) {
         unlink(made.temporary);
-        free(made.temporary);
+        ov_temporary_end(made.temporary);
     }
     free(target.path);
     return status;
@@ -220,6 +225,10 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output) {
     if (fclose(output->stream) != 0 && !error)
         error = errno;
     output->stream = NULL;
+    if (!error && output->temporary && ov_progress_ask(context) != OVOID_OK) {
+        ov_output_abandon(output);
+        return OVOID_ERROR_CANCELLED;
+    }
     if (!error && output->temporary && rename(output->temporary, output->path) != 0)
         error = errno;
     ovoid_status status = OVOID_OK;
@@ -227,7 +236,7 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output) {
         status = fail_write(context, output->path, error);
     } else if (output->temporary) {
         sync_folder(output->path);
-        free(output->temporary); /* it has its final name: nothing to remove */
+        ov_temporary_end(output->temporary); /* it has its final name: nothing to remove */
         output->temporary = NULL;
     }
     ov_output_abandon(output);
@@ -239,7 +248,7 @@ void ov_output_abandon(ov_output *output) {
         unlink(output->temporary);
     if (output->stream && output->path)
         fclose(output->stream);
-    free(output->temporary);
+    ov_temporary_end(output->temporary);
     free(output->path);
     *output = (ov_output){0};
 }
@@ -256,7 +265,7 @@ ovoid_status ov_output_check(ovoid_context *context, const char *path) {
     if (name) {
         close(descriptor);
         unlink(name);
-        free(name);
+        ov_temporary_end(name);
     }
     free(target.path);
     return status;
@@ -296,10 +305,6 @@ ovoid_status ovoid_file_write(ovoid_context *context, ovoid_file *file, const vo
     if (fwrite(data, 1, bytes, file->output.stream) == bytes)
         return OVOID_OK;
     return fail_write(context, file->output.path ? file->output.path : "-", errno);
-}
-
-const char *ovoid_file_temporary(const ovoid_file *file) {
-    return file ? file->output.temporary : NULL;
 }
 
 ovoid_status ovoid_file_commit(ovoid_context *context, ovoid_file *file) {

@@ -94,13 +94,14 @@ bool cli_context(bool *quiet, ovoid_context **context, int *code) {
         return false;
     }
     ovoid_context_on_warning(*context, cli_on_warning, quiet);
+    cli_watch(*context, *quiet);
     return true;
 }
 
 int cli_failure(const ovoid_context *context, ovoid_status status, int io) {
     int number = cli_interrupted();
     if (number) {
-        cli_error("interrupted");
+        cli_tell_interrupted();
         return 128 + number;
     }
     const char *text = ovoid_context_error(context);

@@ -178,6 +178,7 @@ static void print_before(const mesh_job *job) {
     const ovoid_device_info *device = ovoid_context_device(job->context);
     if (!job->summary)
         return;
+    cli_progress_erase();
     if (job->source.model)
         fprintf(job->summary, "model     %s: %zu ellipsoid%s\n", source_name(job->input),
                 ovoid_model_size(job->source.model),
@@ -196,6 +197,7 @@ static void print_after(const mesh_job *job) {
     size_t outer = 0, components = ovoid_mesh_components(job->mesh);
     if (!out)
         return;
+    cli_progress_erase();
     for (size_t c = 0; c < components; c++)
         outer += ovoid_mesh_component(job->mesh, c)->outer;
     const bool exact = job->options.vertices == OVOID_VERTEX_EXACT;
@@ -245,7 +247,6 @@ static int run(mesh_job *job) {
     print_before(job);
     if ((status = make_mesh(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
-    cli_defer_signals(); /* a file under way has to be finished or removed */
     if ((status = ovoid_mesh_write(job->context, job->mesh, job->output)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     print_after(job);

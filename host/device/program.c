@@ -1,5 +1,7 @@
 #include "device/internal.h"
 
+#include "base/progress.h"
+
 #include "shared.h"
 
 #include <stdio.h>
@@ -263,7 +265,11 @@ static ovoid_status get_program(ovoid_context *context, ov_device *device, const
     struct ov_program *program = ov_alloc(context, 1, sizeof *program, "a program");
     if (!program)
         return OVOID_ERROR_MEMORY;
-    ovoid_status status = make_program(context, device, stem, &program->handle);
+    const char *const before = ov_progress_stage(context, "compile");
+    ovoid_status status = ov_progress_ask(context);
+    if (status == OVOID_OK)
+        status = make_program(context, device, stem, &program->handle);
+    ov_progress_stage(context, before);
     if (status != OVOID_OK) {
         free(program);
         return status;

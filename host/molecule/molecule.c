@@ -1,3 +1,4 @@
+#include "base/progress.h"
 #include "molecule/cif.h"
 #include "molecule/radii.h"
 #include "molecule/reader.h"
@@ -465,6 +466,7 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
         return status;
     ov_reader reader = {
         .context = context, .guess = options.format == OVOID_MOLECULE_AUTO, .options = &options};
+    ov_progress_begin(context, "read");
     ov_sites_init(&reader.sites);
     status = OVOID_ERROR_MEMORY;
     reader.molecule = ov_alloc(context, 1, sizeof *reader.molecule, "a molecule");
@@ -473,6 +475,7 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
     OV_TRY(ov_selection_check(context, options.select));
     OV_TRY(ov_text_open(context, path, &reader.text));
     OV_TRY(read_text(&reader, reader.guess ? format_by_name(path) : options.format));
+    OV_TRY(ov_progress_ask(context));
     trim(reader.molecule);
     count_zero_radii(reader.molecule);
     OV_TRY(ov_molecule_doubts(context, ov_text_name(reader.text), reader.molecule));
@@ -486,6 +489,7 @@ cleanup:
     ov_assembly_source_destroy(&reader.assemblies);
     ov_text_close(&reader.text);
     ovoid_molecule_destroy(&reader.molecule);
+    ov_progress_end(context);
     return status;
 }
 

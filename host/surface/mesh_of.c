@@ -46,16 +46,18 @@ ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *m
                        decay);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
+    ov_progress_begin(context, "mesh");
     OV_TRY(check_options(context, options));
     OV_TRY(ov_atoms_check(context, xyzr, atoms, decay));
     bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
     if (!bodies)
-        return OVOID_ERROR_MEMORY;
+        OV_TRY(OVOID_ERROR_MEMORY);
     for (size_t i = 0; i < atoms; ++i)
         ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
     OV_TRY(ov_march(context, bodies, atoms, options, piece_limit, mesh));
 cleanup:
     free(bodies);
+    ov_progress_end(context);
     return status;
 }
 
@@ -82,10 +84,11 @@ ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
     ov_body *bodies = NULL;
     if (!context || !model || !options || !mesh)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_mesh: an argument is NULL");
+    ov_progress_begin(context, "mesh");
     OV_TRY(check_options(context, options));
     bodies = ov_alloc(context, model->count, sizeof *bodies, "ellipsoids");
     if (!bodies)
-        return OVOID_ERROR_MEMORY;
+        OV_TRY(OVOID_ERROR_MEMORY);
     for (size_t i = 0; i < model->count; ++i)
         ov_body_of_ellipsoid(&model->ellipsoids[i], &bodies[i]);
     if (model->count > 0)
@@ -94,5 +97,6 @@ ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
     OV_TRY(ov_march(context, bodies, model->count, options, piece_limit, mesh));
 cleanup:
     free(bodies);
+    ov_progress_end(context);
     return status;
 }

@@ -1,5 +1,6 @@
 #include "surface/render.h"
 
+#include "base/progress.h"
 #include "fit/model.h"
 #include "surface/colour_bar.h"
 #include "surface/image.h"
@@ -524,6 +525,7 @@ ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule
         return status;
     painter p = {.context = context, .options = options};
     ovoid_image *made = NULL;
+    ov_progress_begin(context, "render");
     const bool panel = options->view == OVOID_VIEW_PANEL;
     ov_palette_diverging(p.diverging);
     ov_palette_distinct(p.distinct);
@@ -542,5 +544,6 @@ ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule
 cleanup:
     ovoid_image_destroy(&made);
     destroy_painter(&p);
+    ov_progress_end(context);
     return status;
 }

@@ -1,6 +1,7 @@
 #include "write/export.h"
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "field/field.h"
 #include "write/text.h"
 
@@ -12,7 +13,8 @@
 typedef struct format {
     const char *name;
     const char *extensions;
-    void (*ellipsoids)(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+    ovoid_status (*ellipsoids)(ovoid_context *context, const ovoid_model *model,
+                               const ov_drawing *drawing, FILE *stream);
     ovoid_status (*map)(ovoid_context *context, const ov_map *map, FILE *stream);
 } format;
 
@@ -104,18 +106,20 @@ static ovoid_status write_file(ovoid_context *context, const char *path, const f
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
+    ov_progress_begin(context, chosen->map ? "map" : "write");
     OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
     if (chosen->map)
         OV_TRY(chosen->map(context, map, output.stream));
     else
-        chosen->ellipsoids(model, drawing, output.stream);
+        OV_TRY(chosen->ellipsoids(context, model, drawing, output.stream));
     OV_TRY(ov_stream_check(context, output.stream, path));
     status = ov_output_commit(context, &output);
 
 cleanup:
     ov_output_abandon(&output);
     ov_locale_leave(&locale);
+    ov_progress_end(context);
     return status;
 }
 
@@ -123,11 +127,7 @@ cleanup:
 static ovoid_status write_map(ovoid_context *context, const char *path, const format *chosen,
                               const ovoid_export_options *options, double isovalue,
                               const ov_quadric *quadrics, size_t count, const char *label) {
-    ov_map map = {.quadrics = quadrics,
-                  .count = count,
-                  .spacing = options->spacing,
-                  .progress = options->progress,
-                  .user = options->user};
+    ov_map map = {.quadrics = quadrics, .count = count, .spacing = options->spacing};
     snprintf(map.label, sizeof map.label, "%s", label);
     ovoid_status status = ov_map_cover(context, &map, isovalue);
     return status == OVOID_OK ? write_file(context, path, chosen, NULL, NULL, &map) : status;

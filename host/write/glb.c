@@ -4,6 +4,7 @@
  *
  * glTF's unit is the metre. A molecule in metres is lost to every viewer, so one unit here is one
  * angstrom, as other programs for molecules have it, and asset.extras says so. */
+#include "base/progress.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -73,16 +74,26 @@ static void put_normal(ov_bytes *bytes, const float *normal) {
         ov_put_f32(bytes, usable ? (float)(n[axis] / length) : axis == 2 ? 1.0f : 0.0f);
 }
 
-static void put_buffer(ov_bytes *bytes, const ovoid_mesh *mesh, const layout *l) {
+static ovoid_status put_buffer(ovoid_context *context, ov_bytes *bytes, const ovoid_mesh *mesh,
+                               const layout *l) {
+    ovoid_status status = OVOID_OK;
     const double *xyz = ovoid_mesh_xyz(mesh);
     const float *normals = ovoid_mesh_normals(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
-    for (size_t i = 0; i < 3 * l->vertices; i++)
+    for (size_t i = 0; i < 3 * l->vertices; i++) {
+        OV_TRY(ov_progress_turn(context, i, 3 * l->vertices));
         ov_put_f32(bytes, (float)xyz[i]);
-    for (size_t i = 0; i < l->vertices; i++)
+    }
+    for (size_t i = 0; i < l->vertices; i++) {
+        OV_TRY(ov_progress_turn(context, i, l->vertices));
         put_normal(bytes, normals + 3 * i);
-    for (size_t i = 0; i < 3 * l->triangles; i++)
+    }
+    for (size_t i = 0; i < 3 * l->triangles; i++) {
+        OV_TRY(ov_progress_turn(context, i, 3 * l->triangles));
         ov_put_u32(bytes, corners[i]);
+    }
+cleanup:
+    return status;
 }
 
 ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream) {
@@ -105,7 +116,7 @@ ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     ov_put_text(&bytes, json, json_length);
     ov_put_u32(&bytes, (uint32_t)buffer);
     ov_put_text(&bytes, "BIN\0", 4);
-    put_buffer(&bytes, mesh, &l);
+    const ovoid_status status = put_buffer(context, &bytes, mesh, &l);
     ov_bytes_flush(&bytes);
-    return OVOID_OK;
+    return status;
 }

@@ -1,6 +1,8 @@
 /* A model as JSON (RFC 8259), written as it goes: a tree of it would be many times its size. */
 #include "write/export.h"
 
+#include "base/progress.h"
+
 #include <string.h>
 
 /* Bytes of the UTF-8 character at text, 0 if there is none (RFC 3629, section 4). */
@@ -64,7 +66,9 @@ static void write_ellipsoid(const ovoid_ellipsoid *e, double isovalue, FILE *str
     fprintf(stream, ", \"reaches_isovalue\": %s}", e->amplitude > isovalue ? "true" : "false");
 }
 
-void ov_write_json(const ovoid_model *model, const ov_drawing *drawing, FILE *stream) {
+ovoid_status ov_write_json(ovoid_context *context, const ovoid_model *model,
+                           const ov_drawing *drawing, FILE *stream) {
+    ovoid_status status = OVOID_OK;
     const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
     const char *note;
     fprintf(stream,
@@ -85,9 +89,12 @@ void ov_write_json(const ovoid_model *model, const ov_drawing *drawing, FILE *st
     fputs(ovoid_model_note(model, 0) ? "\n  ],\n" : "],\n", stream);
     fputs("  \"ellipsoids\": [\n", stream);
     for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, ovoid_model_size(model)));
         if (i)
             fputs(",\n", stream);
         write_ellipsoid(&ellipsoids[i], drawing->isovalue, stream);
     }
     fputs("\n  ]\n}\n", stream);
+cleanup:
+    return status;
 }

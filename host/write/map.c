@@ -1,5 +1,6 @@
 #include "write/export.h"
 
+#include "base/progress.h"
 #include "field/evaluate.h"
 
 #include <math.h>
@@ -89,8 +90,8 @@ ovoid_status ov_map_run(ovoid_context *context, const ov_map *map, const int fas
         place_points(map, fast, first, count, xyz);
         OV_TRY(ov_evaluate(context, map->quadrics, map->count, xyz, count, values, NULL));
         sink(values, count, user);
-        if (!ferror(stream) && map->progress && !map->progress(first + count, total, map->user))
-            OV_TRY(ov_fail(context, OVOID_ERROR_CANCELLED, "the export was cancelled"));
+        if (!ferror(stream))
+            OV_TRY(ov_progress_step(context, first + count, total));
     }
 
 cleanup:

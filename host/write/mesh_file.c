@@ -1,6 +1,7 @@
 #include "write/mesh_file.h"
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "write/text.h"
 
 typedef struct format {
@@ -36,6 +37,7 @@ ovoid_status ovoid_mesh_write(ovoid_context *context, const ovoid_mesh *mesh, co
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
+    ov_progress_begin(context, "write");
     OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
     OV_TRY(chosen->write(context, mesh, output.stream));
@@ -45,5 +47,6 @@ ovoid_status ovoid_mesh_write(ovoid_context *context, const ovoid_mesh *mesh, co
 cleanup:
     ov_output_abandon(&output);
     ov_locale_leave(&locale);
+    ov_progress_end(context);
     return status;
 }

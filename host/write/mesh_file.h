@@ -2,7 +2,8 @@
  * The formats of meshes, one file each. Every function writes the whole mesh to a stream, in the
  * order of its vertices and triangles, so that equal meshes give equal bytes. Coordinates are those
  * of the molecule's file, in angstrom, as floats (24 bits: 1e-5 angstrom at 100 angstrom from the
- * origin). A failed write shows in the stream's error flag.
+ * origin). A failed write shows in the stream's error flag; the
+ * context's progress callback may stop them.
  *
  * The mesh has at least one triangle. The thread's locale is "C".
  */

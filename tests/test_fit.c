@@ -261,7 +261,14 @@ static void bad_options_are_named(void **state) {
     REFUSE_ODD(l1.armijo, "armijo");
     REFUSE_ODD(l1.shrink, "shrink");
     REFUSE_ODD(l1.grow, "grow");
-    REFUSE(decay, 0.0, "decay");
+    REFUSE(padding, -1.0, "option padding must not be negative; it is -1");
+    REFUSE(spacing, -1e-300, "option spacing must not be negative; it is -1e-300");
+    REFUSE(decay, 0.0, "option decay must be above 0; it is 0");
+    REFUSE(l1.grow, NAN, "option grow must be a number; it is nan");
+    REFUSE(l1.grow, 0.5, "option grow must be at least 1; it is 0.5");
+    REFUSE(l1.prune_every, 0, "option prune_every must be at least 1; it is 0");
+    REFUSE(spacing, INFINITY, "option spacing must be at most 1000; it is inf");
+    REFUSE(method, (ovoid_method)9, "option method must be one of OVOID_METHOD_...; it is 9");
     REFUSE(decay, INFINITY, "decay");
     REFUSE(isovalue, 0.0, "isovalue");
     REFUSE(isovalue, INFINITY, "isovalue");

@@ -375,8 +375,7 @@ static void accepted_steps_descend(void **state) {
 static void pruning_keeps_its_schedule(void **state) {
     test_skip_simulated(*state);
     fit_run run;
-    ovoid_fit_options options =
-        options_for((uint32_t)test_size(30, 6), (uint32_t)test_size(30, 6));
+    ovoid_fit_options options = options_for((uint32_t)test_size(30, 6), (uint32_t)test_size(30, 6));
     options.l1.prune_every = (uint32_t)test_size(7, 3);
     options.l1.prune_below = 1.3; /* c begins between 1.28 and 2.06, and the L1 term lowers it */
     options.l1.max_error = INFINITY;
@@ -533,8 +532,7 @@ static void ends_where_nothing_changes(void **state) {
 static void result_is_the_last_record(void **state) {
     test_skip_simulated(*state);
     fit_run run;
-    ovoid_fit_options options =
-        options_for((uint32_t)test_size(30, 3), (uint32_t)test_size(50, 5));
+    ovoid_fit_options options = options_for((uint32_t)test_size(30, 3), (uint32_t)test_size(50, 5));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
     const ovoid_fit_result *const result = &run.result;

@@ -51,6 +51,14 @@ ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capaci
 /* Seconds of a monotonic clock. */
 double ov_seconds(void);
 
+/* In a public function: refuses an argument that is NULL, naming
+ * both. The context comes first, for there is no telling without it. */
+#define OV_NEED(context, argument)                                                                 \
+    do {                                                                                           \
+        if (!(argument))                                                                           \
+            return ov_fail(context, OVOID_ERROR_ARGUMENT, "%s: %s is NULL", __func__, #argument);  \
+    } while (0)
+
 /* Runs `expression` (an ovoid_status) and jumps to `cleanup` unless it is OVOID_OK; needs a local
  * variable `status`. */
 #define OV_TRY(expression)                                                                         \

@@ -277,15 +277,20 @@ struct ovoid_file {
     ov_output output;
 };
 
+static ovoid_status fail_finished(ovoid_context *context, const char *function) {
+    return ov_fail(context, OVOID_ERROR_ARGUMENT, "%s: the file is finished", function);
+}
+
 ovoid_status ovoid_file_check(ovoid_context *context, const char *path) {
-    if (!path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_file_check: path is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, path);
     return ov_output_check(context, path);
 }
 
 ovoid_status ovoid_file_create(ovoid_context *context, const char *path, ovoid_file **file) {
-    if (!path || !file)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_file_create: path or file is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, path);
+    OV_NEED(context, file);
     ovoid_file *made = ov_alloc(context, 1, sizeof *made, "an output file");
     if (!made)
         return OVOID_ERROR_MEMORY;
@@ -299,18 +304,22 @@ ovoid_status ovoid_file_create(ovoid_context *context, const char *path, ovoid_f
 
 ovoid_status ovoid_file_write(ovoid_context *context, ovoid_file *file, const void *data,
                               size_t bytes) {
-    if (!file || !file->output.stream || (!data && bytes))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_file_write: no file, a finished one, or no data");
+    OV_NEED(context, context);
+    OV_NEED(context, file);
+    if (bytes)
+        OV_NEED(context, data);
+    if (!file->output.stream)
+        return fail_finished(context, __func__);
     if (fwrite(data, 1, bytes, file->output.stream) == bytes)
         return OVOID_OK;
     return fail_write(context, file->output.path ? file->output.path : "-", errno);
 }
 
 ovoid_status ovoid_file_commit(ovoid_context *context, ovoid_file *file) {
-    if (!file || !file->output.stream)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_file_commit: no file, or a finished one");
+    OV_NEED(context, context);
+    OV_NEED(context, file);
+    if (!file->output.stream)
+        return fail_finished(context, __func__);
     return ov_output_commit(context, &file->output);
 }
 

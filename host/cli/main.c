@@ -291,6 +291,7 @@ int main(int argc, char **argv) {
     if (!isatty(STDOUT_FILENO))
         setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     cli_catch_signals();
+    ovoid_prepare_process();
     int code = run(argc, argv);
     errno = 0;
     if (fflush(stdout) != 0 || ferror(stdout)) {

@@ -275,8 +275,7 @@ ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selec
     const ov_device_entry *entry = NULL;
     ov_device *device = NULL;
     size_t count = 0, platforms = 0;
-    if (!context)
-        return OVOID_ERROR_ARGUMENT;
+    OV_NEED(context, context);
     ov_progress_begin(context, "open");
     OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_devices_list(context, &entries, &count, &platforms));

@@ -179,12 +179,15 @@ static void read_log(ovoid_context *context, const ov_device *device, cl_program
 static ovoid_status fail_build(ovoid_context *context, const ov_device *device, const char *stem,
                                cl_program handle, cl_int code, const char *options) {
     ov_text log = {0};
+    char disk[OV_POCL_TEXT] = "";
     read_log(context, device, handle, &log);
+    if (ov_full_disk(disk, sizeof disk - 1))
+        strcat(disk, "\n");
     ovoid_status status =
         ov_fail(context, OVOID_ERROR_OPENCL,
-                "clBuildProgram: %s (%d), program %s.cl, device %s, driver %s\noptions: %s\n%s",
-                ov_cl_name(code), (int)code, stem, device->info.name, device->info.driver, options,
-                log.length ? log.text : "(no build log)");
+                "%sclBuildProgram: %s (%d), program %s.cl, device %s, driver %s\noptions: %s\n%s",
+                disk, ov_cl_name(code), (int)code, stem, device->info.name, device->info.driver,
+                options, log.length ? log.text : "(no build log)");
     free(log.text);
     return status;
 }

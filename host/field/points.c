@@ -1,5 +1,7 @@
 #include "field/field.h"
 
+#include "base/progress.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -129,7 +131,9 @@ static ovoid_status order_points(ovoid_context *context, const float *xyz, size_
         }
         keys[k] = ov_hilbert_index(at[0], at[1], at[2], bits);
     }
-    const ovoid_status status = ov_sort_keys(context, keys, count, order);
+    ovoid_status status = ov_progress_ask(context);
+    if (status == OVOID_OK)
+        status = ov_sort_keys(context, keys, count, order);
     free(keys);
     return status;
 }
@@ -191,7 +195,9 @@ ovoid_status ov_points_create(ovoid_context *context, const float *xyz, size_t c
         goto cleanup;
     }
     OV_TRY(order_points(context, xyz, count, resolution, made.order));
+    OV_TRY(ov_progress_ask(context));
     pack_points(xyz, &made, packed, leaves);
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_points_upload(context, packed, leaves, &made));
 
 cleanup:

@@ -33,8 +33,12 @@ cleanup:
 ovoid_status ovoid_molecule_field(ovoid_context *context, const ovoid_molecule *molecule,
                                   double decay, const double *xyz, size_t count, double *value,
                                   double *gradient) {
-    if (!context || !molecule || (count > 0 && (!xyz || !value)))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_field: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    if (count > 0) {
+        OV_NEED(context, xyz);
+        OV_NEED(context, value);
+    }
     if (!(decay > 0.0 && decay <= 100.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
                        decay);
@@ -55,8 +59,12 @@ ovoid_status ovoid_molecule_field(ovoid_context *context, const ovoid_molecule *
 
 ovoid_status ovoid_model_field(ovoid_context *context, const ovoid_model *model, const double *xyz,
                                size_t count, double *value, double *gradient) {
-    if (!context || !model || (count > 0 && (!xyz || !value)))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_field: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    if (count > 0) {
+        OV_NEED(context, xyz);
+        OV_NEED(context, value);
+    }
     ov_quadric *const quadrics = ov_alloc(context, model->count, sizeof *quadrics, "ellipsoids");
     if (!quadrics)
         return OVOID_ERROR_MEMORY;

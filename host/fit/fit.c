@@ -68,8 +68,10 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
     ovoid_model *made = NULL;
     ovoid_fit_result done = {0};
     ov_device *device;
-    if (!context || !molecule || !options || !model)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_fit: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, options);
+    OV_NEED(context, model);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const double began = ov_seconds();

@@ -527,8 +527,10 @@ cleanup:
 ovoid_status ovoid_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
                                   bool outer_only, ovoid_distances *distances, float *from_a) {
     float *of_vertices = NULL;
-    if (!a || !b || !distances)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "distances are of two meshes");
+    OV_NEED(context, context);
+    OV_NEED(context, a);
+    OV_NEED(context, b);
+    OV_NEED(context, distances);
     if (from_a) {
         of_vertices = ov_alloc(context, a->vertices, sizeof *of_vertices, "distances");
         if (!of_vertices)

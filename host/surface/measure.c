@@ -6,6 +6,8 @@
 #include <string.h>
 
 void ovoid_measure_options_init(ovoid_measure_options *options) {
+    if (!options)
+        return;
     *options = (ovoid_measure_options){.isovalue = OVOID_DEFAULT_ISOVALUE,
                                        .spacing = OVOID_DEFAULT_MESH_SPACING,
                                        .vertices = OVOID_VERTEX_EXACT,
@@ -24,18 +26,13 @@ static uint64_t count_outer(const ovoid_mesh *mesh) {
     return count;
 }
 
-static ov_content content_of(const ovoid_mesh *mesh, bool smooth, bool outer_only) {
-    return smooth ? ov_mesh_smooth(mesh, outer_only) : ov_mesh_flat(mesh, outer_only);
-}
-
 static ovoid_status compare_contents(ovoid_context *context, const ovoid_mesh *original,
                                      const ovoid_mesh *sparse, bool smooth, bool outer_only,
                                      ovoid_pair *area, ovoid_pair *volume) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(ov_progress_ask(context));
-    const ov_content first = content_of(original, smooth, outer_only);
-    OV_TRY(ov_progress_ask(context));
-    const ov_content second = content_of(sparse, smooth, outer_only);
+    ov_content first, second;
+    OV_TRY(ov_mesh_content(context, original, smooth, outer_only, &first));
+    OV_TRY(ov_mesh_content(context, sparse, smooth, outer_only, &second));
     *area = pair_of(first.area, second.area);
     *volume = pair_of(first.volume, second.volume);
 cleanup:
@@ -110,9 +107,11 @@ ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecul
     ovoid_status status = OVOID_OK;
     ovoid_mesh *original = NULL, *sparse = NULL;
     ovoid_measures made;
-    if (!molecule || !model || !options || !measures)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "measuring takes a molecule, a model and options");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, model);
+    OV_NEED(context, options);
+    OV_NEED(context, measures);
     ov_progress_begin(context, "mesh");
     const double begin = ov_seconds();
     const ovoid_mesh_options meshing = {options->isovalue, options->spacing, options->vertices};

@@ -66,4 +66,8 @@ typedef struct ov_content {
 ov_content ov_mesh_flat(const ovoid_mesh *mesh, bool outer_only);
 ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only);
 
+/* Either of them, asking on the way whether to go on. */
+ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
+                             bool outer_only, ov_content *result);
+
 #endif

@@ -39,8 +39,10 @@ ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *m
                                  ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     ov_body *bodies = NULL;
-    if (!context || !molecule || !options || !mesh)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_mesh: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, options);
+    OV_NEED(context, mesh);
     if (!(decay > 0.0 && decay <= 100.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
                        decay);
@@ -82,8 +84,10 @@ ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
                               const ovoid_mesh_options *options, ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     ov_body *bodies = NULL;
-    if (!context || !model || !options || !mesh)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_mesh: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    OV_NEED(context, options);
+    OV_NEED(context, mesh);
     ov_progress_begin(context, "mesh");
     OV_TRY(check_options(context, options));
     bodies = ov_alloc(context, model->count, sizeof *bodies, "ellipsoids");

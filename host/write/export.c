@@ -50,6 +50,8 @@ ovoid_export_format ovoid_export_format_find(const char *name) {
 }
 
 void ovoid_export_options_init(ovoid_export_options *options) {
+    if (!options)
+        return;
     *options = (ovoid_export_options){
         .spacing = OVOID_DEFAULT_MESH_SPACING, .colour = {0.30, 0.55, 0.80}, .opacity = 1.0};
 }
@@ -63,7 +65,7 @@ static ovoid_status check_options(ovoid_context *context, const ovoid_export_opt
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "%d is no format of an export",
                        (int)o->format);
     if (!(o->isovalue >= 0.0 && isfinite(o->isovalue)))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue %g is not positive", o->isovalue);
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue must be finite and not negative; it is %g", o->isovalue);
     if (!(o->spacing > 0.0 && o->spacing <= 1000.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "spacing %g is not above 0 and at most 1000 angstrom", o->spacing);
@@ -153,8 +155,9 @@ static ovoid_status export_model_map(ovoid_context *context, const ovoid_model *
 
 ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model, const char *path,
                                 const ovoid_export_options *options) {
-    if (!context || !model || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_export: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    OV_NEED(context, path);
     ovoid_export_options o;
     const format *chosen;
     ovoid_export_options_init(&o);
@@ -177,8 +180,9 @@ ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model
 ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
                                    double decay, const char *path,
                                    const ovoid_export_options *options) {
-    if (!context || !molecule || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_export: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, path);
     if (!(decay > 0.0 && decay <= 100.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
                        decay);

@@ -23,8 +23,9 @@ static const format *find_format(const char *path) {
 }
 
 ovoid_status ovoid_mesh_write(ovoid_context *context, const ovoid_mesh *mesh, const char *path) {
-    if (!mesh || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_mesh_write: mesh or path is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, mesh);
+    OV_NEED(context, path);
     const format *chosen = find_format(path);
     if (!chosen)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,

@@ -30,8 +30,9 @@ static void write_ellipsoid(const ovoid_ellipsoid *ellipsoid, FILE *stream) {
 }
 
 ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model, const char *path) {
-    if (!model || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_write: model or path is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    OV_NEED(context, path);
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
@@ -221,8 +222,9 @@ static ovoid_status read_lines(reader *r) {
 }
 
 ovoid_status ovoid_model_read(ovoid_context *context, const char *path, ovoid_model **model) {
-    if (!path || !model)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_read: path or model is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, path);
+    OV_NEED(context, model);
     ovoid_status status = OVOID_OK;
     ov_locale locale = {0};
     bool standard_input = strcmp(path, "-") == 0;
@@ -240,6 +242,7 @@ ovoid_status ovoid_model_read(ovoid_context *context, const char *path, ovoid_mo
     if (!r->stream)
         OV_TRY(ov_fail(context, OVOID_ERROR_IO, "cannot read '%s': %s", path, strerror(errno)));
     OV_TRY(ov_locale_enter(context, &locale));
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(read_lines(r));
     r->model->decay = isnan(r->decay) ? OVOID_DEFAULT_DECAY : r->decay;
     r->model->isovalue = isnan(r->isovalue) ? OVOID_DEFAULT_ISOVALUE : r->isovalue;

@@ -101,8 +101,9 @@ cleanup:
 }
 
 ovoid_status ovoid_image_write(ovoid_context *context, const ovoid_image *image, const char *path) {
-    if (!image || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_image_write: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, image);
+    OV_NEED(context, path);
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_progress_begin(context, "write");

@@ -13,7 +13,12 @@
  *   ovoid_context_error() describes what happened, with file, line, OpenCL call or device.
  * - xxx_destroy(xxx **) frees, sets the pointer to NULL, and accepts NULL and repeats. Whatever a
  *   function hands out as a pointer to const belongs to the object it came from.
- * - The library prints nothing, never exits and installs no signal handler.
+ * - NULL, where it has no meaning of its own: a function that returns a status returns
+ *   OVOID_ERROR_ARGUMENT and names the argument; one that answers a question answers 0, NULL, NAN
+ * or
+ *   "", as if of nothing; all others, such as xxx_options_init(), do nothing.
+ * - The library prints nothing, never exits, installs no signal handler and does not touch the
+ *   environment (but see ovoid_prepare_process()).
  * - A context and what is made with it may be used by one thread at a time; different contexts are
  *   independent.
  */
@@ -117,6 +122,14 @@ typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
 OVOID_API void ovoid_context_on_progress(ovoid_context *context, ovoid_progress_fn fn, void *user);
 
 /* ---- devices ------------------------------------------------------------------------------ */
+
+/* For a program to call at its beginning, before it has other threads and before it uses OpenCL:
+ * where PoCL cannot keep compiled kernels in its folder (full, not writable, or on a file system
+ * mounted noexec, which would end the process), POCL_CACHE_DIR is set to another one. This is the
+ * only function that touches the environment, which no thread may read meanwhile; a program that
+ * does not call it loses PoCL's devices in such a case. The first context that lists devices warns
+ * of what was done. */
+OVOID_API void ovoid_prepare_process(void);
 
 typedef enum ovoid_device_type {
     OVOID_DEVICE_CPU,

@@ -559,7 +559,8 @@ static void bad_options_are_named(void **state) {
     o = options_of(OVOID_GOAL_RATIO, 1.001);
     expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "ratio");
     o = options_of(OVOID_GOAL_ELLIPSOIDS, 0);
-    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "option ellipsoids must be at least 1; it is 0");
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT,
+                   "option ellipsoids must be at least 1; it is 0");
     o = options_of(OVOID_GOAL_ELLIPSOIDS, 4);
     expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT,
                    "4 ellipsoids are asked for, and there are only 3 atoms");

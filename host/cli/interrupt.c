@@ -52,7 +52,7 @@ static const int numbers[SIGNALS] = {SIGINT, SIGTERM, SIGHUP};
 static bool ignored[SIGNALS]; /* by the caller */
 
 static void handle(int number, void (*handler)(int)) {
-    struct sigaction action = {.sa_handler = handler, .sa_flags = SA_RESTART};
+    struct sigaction action = {.sa_handler = handler}; /* a call that waits ends, with EINTR */
     sigemptyset(&action.sa_mask);
     sigaction(number, &action, NULL);
 }

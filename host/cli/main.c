@@ -296,7 +296,10 @@ int main(int argc, char **argv) {
     errno = 0;
     if (fflush(stdout) != 0 || ferror(stdout)) {
         /* Whoever asked for the output to be written has reported it already. */
-        if (code == CLI_OK) {
+        if (code == CLI_OK && cli_interrupted()) {
+            cli_tell_interrupted();
+            code = 128 + cli_interrupted();
+        } else if (code == CLI_OK) {
             cli_error("cannot write standard output: %s", strerror(errno ? errno : EIO));
             code = CLI_OUTPUT;
         }

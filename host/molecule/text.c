@@ -60,9 +60,12 @@ static ovoid_status read_raw(ov_text *text) {
     text->raw_end -= text->raw_at;
     text->raw_at = 0;
     ssize_t got;
-    do
-        got = read(text->file, text->raw + text->raw_end, RAW_ROOM - text->raw_end);
-    while (got < 0 && errno == EINTR);
+    while ((got = read(text->file, text->raw + text->raw_end, RAW_ROOM - text->raw_end)) < 0 &&
+           errno == EINTR) {
+        const ovoid_status asked = ov_progress_ask(text->context);
+        if (asked != OVOID_OK)
+            return asked;
+    }
     if (got < 0)
         return ov_fail(text->context, OVOID_ERROR_IO, "%s: cannot read: %s", text->name,
                        strerror(errno));

@@ -65,7 +65,8 @@ static ovoid_status check_options(ovoid_context *context, const ovoid_export_opt
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "%d is no format of an export",
                        (int)o->format);
     if (!(o->isovalue >= 0.0 && isfinite(o->isovalue)))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue must be finite and not negative; it is %g", o->isovalue);
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "isovalue must be finite and not negative; it is %g", o->isovalue);
     if (!(o->spacing > 0.0 && o->spacing <= 1000.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "spacing %g is not above 0 and at most 1000 angstrom", o->spacing);

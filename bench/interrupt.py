@@ -8,7 +8,7 @@
 Runs each command on MOLECULE (default: 1aon of the folder DIR) once to its end, and then again and again, with a
 SIGINT at moments that are spread over the time that it took. The stage is the one that the progress line named last,
 `(start)` before there was any. Prints and writes a row per command and stage: how many signals, the largest and the
-median number of seconds, how many were so late that the tool did not wait any longer for what was under way (0.7 s),
+median number of seconds, how many were so late that the tool did not wait any longer for what was under way (0.5 s),
 exit codes, and files that were left in the folder, which must be none. Code 0 is that of a command which had its files
 in place already, and these do not count.
 """
@@ -29,7 +29,7 @@ import time
 from common import find, short, write_table
 
 COLUMNS = "command stage signals largest_seconds median_seconds given_up codes files_left".split()
-PATIENCE = 0.7  # host/cli/interrupt.c
+PATIENCE = 0.5  # host/cli/interrupt.c
 STAGES = ("read open compile field mesh measure map render write sample sparse accuracy merge refine repair grow "
           "shrink").split()
 

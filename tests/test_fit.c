@@ -284,7 +284,7 @@ static void bad_options_are_named(void **state) {
     REFUSE(l1.prune_every, 0, "prune_every");
     REFUSE(l1.max_backtracks, 0, "max_backtracks");
     REFUSE(l1.sparse_iterations, 100000, "sparse_iterations");
-    REFUSE(l1.first_step, (ovoid_first_step)9, "first step");
+    REFUSE(l1.first_step, (ovoid_first_step)9, "option first_step");
     REFUSE(method, (ovoid_method)9, "method");
     o = short_options();
     o.l1.iterations = o.l1.sparse_iterations = 0;

@@ -8,7 +8,7 @@
 
 /* Work asks every few milliseconds whether to go on. What cannot ask, a driver's compiler or a
  * write that waits, is not waited for any longer than this. */
-#define PATIENCE_NANOSECONDS 700000000L
+#define PATIENCE_NANOSECONDS 500000000L
 
 static atomic_int caught; /* two signals may come at once, in threads of the driver */
 static atomic_bool told;  /* that the work was interrupted */

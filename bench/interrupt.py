@@ -173,9 +173,9 @@ def main():
             for row in rows_of(name, command, arguments.moments):
                 print("  " + "  ".join(f"{key} {value}" for key, value in row.items() if key != "command"), flush=True)
                 rows.append(row)
+            write_table(arguments.output, f"ovoid interrupted: {os.path.basename(arguments.molecule)}", COLUMNS, rows)
     worst = max(rows, key=lambda row: row["largest_seconds"])
     print(f"largest: {worst['largest_seconds']} s ({worst['command']}, {worst['stage']})")
-    write_table(arguments.output, f"ovoid interrupted: {os.path.basename(arguments.molecule)}", COLUMNS, rows)
 
 
 if __name__ == "__main__":

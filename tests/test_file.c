@@ -134,6 +134,31 @@ static void temporaries_can_be_removed(void **state) {
     assert_int_equal(scratch_entries(s), 1);
 }
 
+/* Stands in for fsync(): a signal that ends the process meets it while the folder is written. */
+static bool end_at_folder;
+int __wrap_fsync(int descriptor);
+int __wrap_fsync(int descriptor) {
+    struct stat info;
+    if (end_at_folder && fstat(descriptor, &info) == 0 && S_ISDIR(info.st_mode))
+        ovoid_remove_temporaries();
+    return 0;
+}
+
+/* A file that was there before has its new contents by then. */
+static void nothing_is_left_of_a_commit_that_a_signal_ends(void **state) {
+    scratch *s = *state;
+    assert_int_equal(put(scratch_path(s, "old"), "old"), OVOID_OK);
+    end_at_folder = true;
+    assert_int_equal(put(scratch_path(s, "old"), "new"), OVOID_OK);
+    assert_int_equal(put(scratch_path(s, "fresh"), "new"), OVOID_OK);
+    end_at_folder = false;
+    assert_int_equal(scratch_entries(s), 1);
+    assert_holds(scratch_path(s, "old"), "new");
+    assert_int_equal(put(scratch_path(s, "fresh"), "new"), OVOID_OK);
+    ovoid_remove_temporaries(); /* too late */
+    assert_int_equal(scratch_entries(s), 2);
+}
+
 static bool refuse(const ovoid_progress *progress, void *user) {
     (void)progress;
     ++*(int *)user;
@@ -315,6 +340,7 @@ int main(void) {
         IN_SCRATCH(old_file_stays_until_the_commit),
         IN_SCRATCH(dropped_file_leaves_nothing),
         IN_SCRATCH(temporaries_can_be_removed),
+        IN_SCRATCH(nothing_is_left_of_a_commit_that_a_signal_ends),
         IN_SCRATCH(a_stopped_commit_leaves_the_old_file),
         IN_SCRATCH(link_stays_a_link),
         IN_SCRATCH(dangling_link_gets_its_target),

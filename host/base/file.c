@@ -168,6 +168,7 @@ ovoid_status ov_output_open(ovoid_context *context, const char *path, ov_output 
             OV_TRY(fail_write(context, path, errno));
     } else {
         OV_TRY(temporary_create(context, path, &target, &descriptor, &made.temporary));
+        made.fresh = !target.exists;
         if (target.exists)
             keep_permissions(descriptor, &target.old);
     }
@@ -221,6 +222,7 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output) {
         *output = (ov_output){0};
         return error ? fail_write(context, "-", error) : OVOID_OK;
     }
+    char *fresh = NULL;
     int error = flush_to_disk(output->stream);
     if (fclose(output->stream) != 0 && !error)
         error = errno;
@@ -228,6 +230,12 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output) {
     if (!error && output->temporary && ov_progress_ask(context) != OVOID_OK) {
         ov_output_abandon(output);
         return OVOID_ERROR_CANCELLED;
+    }
+    if (output->temporary && output->fresh) {
+        /* Ended by a handler between here and the return, the process leaves no file either:
+         * syncing a folder can take its time. */
+        fresh = join(NULL, output->path, strlen(output->path), "");
+        ov_temporary_begin(fresh);
     }
     if (!error && output->temporary && rename(output->temporary, output->path) != 0)
         error = errno;
@@ -239,6 +247,7 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output) {
         ov_temporary_end(output->temporary); /* it has its final name: nothing to remove */
         output->temporary = NULL;
     }
+    ov_temporary_end(fresh);
     ov_output_abandon(output);
     return status;
 }

@@ -10,7 +10,7 @@
 enum { ROOM = 64 };
 static _Atomic(const char *) paths[ROOM];
 
-/* In the place of a path that a handler has taken. */
+/* In the place of a path while a handler reads it. */
 static const char taken[] = "";
 
 void ov_temporary_begin(const char *path) {
@@ -31,7 +31,7 @@ void ov_temporary_end(char *path) {
         }
         handled |= found == taken;
     }
-    if (!handled) /* there was no room for it */
+    if (!handled) /* there was no room for it, or a handler is done with it */
         free(path);
 }
 
@@ -40,8 +40,10 @@ void ovoid_remove_temporaries(void) {
         const char *const path = atomic_load(&paths[i]);
         if (path && path != taken) {
             const char *found = path;
-            if (atomic_compare_exchange_strong(&paths[i], &found, taken))
+            if (atomic_compare_exchange_strong(&paths[i], &found, taken)) {
                 unlink(path);
+                atomic_store(&paths[i], NULL);
+            }
         }
     }
 }

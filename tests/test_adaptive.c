@@ -573,11 +573,11 @@ static void a_stopped_fit_hands_over_nothing(void **state) {
         memset(&untouched, 0x5a, sizeof untouched);
         result = untouched;
         options.adaptive.effort = 2;
-        options.progress = stop_there;
-        options.user = &s;
+        ovoid_context_on_progress(*state, stop_there, &s);
         print_message("stopped at %s %u\n", cases[n].stage, cases[n].count);
         test_refused(*state, ovoid_fit(*state, molecule, &options, &model, &result),
                      OVOID_ERROR_CANCELLED, "stopped");
+        ovoid_context_on_progress(*state, NULL, NULL);
         assert_ptr_equal(model, nothing);
         assert_memory_equal(&result, &untouched, sizeof result);
     }
@@ -617,7 +617,8 @@ static void bad_options_are_named(void **state) {
     o = options_of(OVOID_GOAL_RATIO, 1.001);
     expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "ratio");
     o = options_of(OVOID_GOAL_ELLIPSOIDS, 0);
-    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "at least one ellipsoid");
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT,
+                   "option ellipsoids must be at least 1; it is 0");
     o = options_of(OVOID_GOAL_ELLIPSOIDS, 4);
     expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT,
                    "4 ellipsoids are asked for, and there are only 3 atoms");
@@ -627,7 +628,7 @@ static void bad_options_are_named(void **state) {
     o.adaptive.effort = 11;
     expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "effort");
     o = options_of((ovoid_goal)7, 1.0);
-    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "unknown goal");
+    expect_refusal(*state, molecule, &o, OVOID_ERROR_ARGUMENT, "option goal must be one of");
     ovoid_molecule_destroy(&molecule);
 }
 

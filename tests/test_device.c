@@ -1040,6 +1040,8 @@ static void print_warning(const char *text, void *user) {
 
 /* Lists devices, opens the one asked for, and runs a kernel on it; prints what happens. */
 static int child(const char *selector) {
+    if (!getenv("UNPREPARED"))
+        ovoid_prepare_process();
     ovoid_context *context = NULL;
     ovoid_device_info *devices = NULL;
     size_t count = 0;

@@ -368,7 +368,7 @@ static void test_refusals(void **state) {
     test_refused(context, ovoid_mesh_distances(context, a, d, false, &result, from_a),
                  OVOID_ERROR_NUMERIC, "more than a float holds");
     test_refused(context, ovoid_mesh_distances(context, a, NULL, false, &result, NULL),
-                 OVOID_ERROR_ARGUMENT, "two meshes");
+                 OVOID_ERROR_ARGUMENT, "is NULL");
     expect_near(result.hausdorff, 42.0, 0.0, "an output of a failure");
     expect_near(from_a[0], 42.0, 0.0, "an output of a failure");
     test_check(context, ovoid_mesh_distances(context, b, a, false, &result, NULL));

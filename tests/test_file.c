@@ -87,10 +87,10 @@ static void old_file_stays_until_the_commit(void **state) {
     assert_int_equal(ovoid_file_create(context, path, &file), OVOID_OK);
     assert_int_equal(ovoid_file_write(context, file, "new", 3), OVOID_OK);
     assert_holds(path, "old");
-    assert_int_equal(access(ovoid_file_temporary(file), F_OK), 0);
+    assert_int_equal(scratch_entries(s), 2);
     assert_int_equal(ovoid_file_commit(context, file), OVOID_OK);
     assert_holds(path, "new");
-    assert_null(ovoid_file_temporary(file));
+    assert_int_equal(scratch_entries(s), 1);
     assert_int_equal(ovoid_file_write(context, file, "x", 1), OVOID_ERROR_ARGUMENT);
     assert_int_equal(ovoid_file_commit(context, file), OVOID_ERROR_ARGUMENT);
     ovoid_file_destroy(&file);
@@ -106,6 +106,82 @@ static void dropped_file_leaves_nothing(void **state) {
     assert_int_equal(scratch_entries(s), 1);
     ovoid_file_destroy(&file);
     assert_int_equal(scratch_entries(s), 0);
+}
+
+/* As a signal handler does it: what was there stays, and the files cannot be finished any more. */
+static void temporaries_can_be_removed(void **state) {
+    enum { FILES = 3, MORE = 100 };
+    scratch *s = *state;
+    ovoid_file *files[FILES] = {NULL};
+    char names[FILES][8];
+    for (int i = 0; i < MORE; i++) /* those that were finished or dropped leave their room */
+        assert_int_equal(put(scratch_path(s, "0"), "old"), OVOID_OK);
+    for (int i = 0; i < FILES; i++) {
+        snprintf(names[i], sizeof names[i], "%d", i);
+        assert_int_equal(ovoid_file_create(context, scratch_path(s, names[i]), &files[i]),
+                         OVOID_OK);
+        assert_int_equal(ovoid_file_write(context, files[i], "new", 3), OVOID_OK);
+    }
+    ovoid_file_destroy(&files[2]);
+    assert_int_equal(scratch_entries(s), 3);
+    ovoid_remove_temporaries();
+    ovoid_remove_temporaries();
+    assert_int_equal(scratch_entries(s), 1);
+    assert_int_equal(ovoid_file_commit(context, files[0]), OVOID_ERROR_IO);
+    ovoid_file_destroy(&files[0]);
+    ovoid_file_destroy(&files[1]);
+    assert_holds(scratch_path(s, "0"), "old");
+    assert_int_equal(scratch_entries(s), 1);
+}
+
+/* Stands in for fsync(): a signal that ends the process meets it while the folder is written. */
+static bool end_at_folder;
+int __wrap_fsync(int descriptor);
+int __wrap_fsync(int descriptor) {
+    struct stat info;
+    if (end_at_folder && fstat(descriptor, &info) == 0 && S_ISDIR(info.st_mode))
+        ovoid_remove_temporaries();
+    return 0;
+}
+
+/* A file that was there before has its new contents by then. */
+static void nothing_is_left_of_a_commit_that_a_signal_ends(void **state) {
+    scratch *s = *state;
+    assert_int_equal(put(scratch_path(s, "old"), "old"), OVOID_OK);
+    end_at_folder = true;
+    assert_int_equal(put(scratch_path(s, "old"), "new"), OVOID_OK);
+    assert_int_equal(put(scratch_path(s, "fresh"), "new"), OVOID_OK);
+    end_at_folder = false;
+    assert_int_equal(scratch_entries(s), 1);
+    assert_holds(scratch_path(s, "old"), "new");
+    assert_int_equal(put(scratch_path(s, "fresh"), "new"), OVOID_OK);
+    ovoid_remove_temporaries(); /* too late */
+    assert_int_equal(scratch_entries(s), 2);
+}
+
+static bool refuse(const ovoid_progress *progress, void *user) {
+    (void)progress;
+    ++*(int *)user;
+    return false;
+}
+
+/* The last moment to stop is before the file gets its name. */
+static void a_stopped_commit_leaves_the_old_file(void **state) {
+    scratch *s = *state;
+    int asked = 0;
+    const char *path = scratch_path(s, "file");
+    ovoid_file *file = NULL;
+    assert_int_equal(put(path, "old"), OVOID_OK);
+    assert_int_equal(ovoid_file_create(context, path, &file), OVOID_OK);
+    assert_int_equal(ovoid_file_write(context, file, "new", 3), OVOID_OK);
+    ovoid_context_on_progress(context, refuse, &asked);
+    assert_int_equal(ovoid_file_commit(context, file), OVOID_ERROR_CANCELLED);
+    ovoid_context_on_progress(context, NULL, NULL);
+    assert_int_equal(asked, 1);
+    assert_int_equal(ovoid_file_commit(context, file), OVOID_ERROR_ARGUMENT);
+    ovoid_file_destroy(&file);
+    assert_holds(path, "old");
+    assert_int_equal(scratch_entries(s), 1);
 }
 
 static void link_stays_a_link(void **state) {
@@ -253,7 +329,6 @@ static void null_arguments_are_refused(void **state) {
     assert_int_equal(ovoid_file_write(context, NULL, "x", 1), OVOID_ERROR_ARGUMENT);
     assert_int_equal(ovoid_file_commit(context, NULL), OVOID_ERROR_ARGUMENT);
     ovoid_file_destroy(NULL);
-    assert_null(ovoid_file_temporary(NULL));
 }
 
 #define IN_SCRATCH(test) cmocka_unit_test_setup_teardown(test, scratch_setup, scratch_teardown)
@@ -264,6 +339,9 @@ int main(void) {
         IN_SCRATCH(replaced_file_keeps_its_mode),
         IN_SCRATCH(old_file_stays_until_the_commit),
         IN_SCRATCH(dropped_file_leaves_nothing),
+        IN_SCRATCH(temporaries_can_be_removed),
+        IN_SCRATCH(nothing_is_left_of_a_commit_that_a_signal_ends),
+        IN_SCRATCH(a_stopped_commit_leaves_the_old_file),
         IN_SCRATCH(link_stays_a_link),
         IN_SCRATCH(dangling_link_gets_its_target),
         IN_SCRATCH(circle_of_links_fails),

@@ -255,7 +255,7 @@ static void stopping(void **state) {
     test_refused(*state,
                  ov_judge_create(*state, two, 2, 0.5, 1.0, spacing(),
                                  (ov_watch){.go_on = count_down, .user = &none}, &other),
-                 OVOID_ERROR_CANCELLED, "meshing");
+                 OVOID_ERROR_CANCELLED, "stopped");
     ov_quadric *const quadrics = quadrics_of(two, 2, 0.5);
     all.asked = 0;
     test_check(*state, ov_judge_model(&judge, quadrics, 2, &got));
@@ -265,7 +265,7 @@ static void stopping(void **state) {
     for (all.most = 0; all.most < questions; ++all.most) {
         all.asked = 0;
         test_refused(*state, ov_judge_spots(&judge, quadrics, 2, 0.0, 1.0, 9, &got, &spots, &count),
-                     OVOID_ERROR_CANCELLED, all.most + 2 < questions ? "meshing" : "distances");
+                     OVOID_ERROR_CANCELLED, "stopped");
         assert_int_equal(all.asked, all.most + 1);
         assert_null(spots);
     }

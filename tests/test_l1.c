@@ -5,14 +5,15 @@
 #include "support.h"
 
 typedef struct trace {
-    ovoid_progress *records; /* of iterations, not of sampling */
+    ovoid_progress *records; /* one of each iteration */
     size_t count, capacity;
 } trace;
 
 static bool record(const ovoid_progress *progress, void *user) {
     trace *const t = user;
-    if (strcmp(progress->stage, "sample") == 0)
-        return true;
+    const ovoid_progress *const last = t->count ? &t->records[t->count - 1] : NULL;
+    if (progress->iteration == (last ? last->iteration : 0))
+        return true; /* between two iterations */
     if (t->count == t->capacity) {
         t->capacity = 2 * t->capacity + 64;
         t->records = realloc(t->records, t->capacity * sizeof *t->records);
@@ -24,7 +25,7 @@ static bool record(const ovoid_progress *progress, void *user) {
 }
 
 /* Everything is set here, whatever the defaults are. */
-static ovoid_fit_options options_for(trace *t, uint32_t sparse_iterations, uint32_t iterations) {
+static ovoid_fit_options options_for(uint32_t sparse_iterations, uint32_t iterations) {
     const ovoid_fit_options options = {
         .method = OVOID_METHOD_L1,
         .decay = 0.5,
@@ -43,8 +44,6 @@ static ovoid_fit_options options_for(trace *t, uint32_t sparse_iterations, uint3
                .shrink = 0.5,
                .grow = 2.0,
                .max_backtracks = 30},
-        .progress = record,
-        .user = t,
     };
     return options;
 }
@@ -67,9 +66,10 @@ static void run_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                     ovoid_fit_options *options, fit_run *run) {
     ovoid_molecule *molecule = NULL;
     memset(run, 0, sizeof *run);
-    options->user = &run->trace;
     test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
+    ovoid_context_on_progress(context, record, &run->trace);
     test_check(context, ovoid_fit(context, molecule, options, &run->model, &run->result));
+    ovoid_context_on_progress(context, NULL, NULL);
     /* An atom keeps its own ellipsoid as long as there is one: none is left without an atom. Where
      * the inside empties, whose it was comes down to rounding. */
     const double most = options->l1.inside_every ? 0.8 : 0.5;
@@ -133,7 +133,7 @@ static size_t points_of(ovoid_context *context, const double *xyzr, size_t atoms
 static void starts_with_the_atoms(void **state) {
     fit_run run;
     double sparse = 0.0;
-    ovoid_fit_options options = options_for(NULL, 1, 1);
+    ovoid_fit_options options = options_for(1, 1);
     options.l1.epsilon = 1e-30;
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const first = &run.trace.records[0];
@@ -169,7 +169,7 @@ static void expect_step(ovoid_context *context, ovoid_kernel kernel, uint32_t in
     double *xyz, *target;
     const bool spheres = kernel == OVOID_KERNEL_SPHERE; /* their amplitudes alone move */
     const size_t moving = spheres ? 1 : 10, penalised = spheres ? 1 : 4;
-    ovoid_fit_options options = options_for(NULL, sparse_iterations, iterations);
+    ovoid_fit_options options = options_for(sparse_iterations, iterations);
     options.l1.kernel = kernel;
     options.l1.inside_every = inside_every;
     options.l1.prune_every = UINT32_MAX;
@@ -240,7 +240,7 @@ static void spheres_change_amplitudes_alone(void **state) {
     fit_run run;
     double moved = 0.0, sparse = 0.0;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(200, 6), (uint32_t)test_size(240, 8));
+        options_for((uint32_t)test_size(200, 6), (uint32_t)test_size(240, 8));
     options.l1.kernel = OVOID_KERNEL_SPHERE;
     options.l1.prune_below = 1.0; /* so that some are deleted */
     options.l1.prune_every = (uint32_t)test_size(20, 3);
@@ -276,7 +276,7 @@ static void weights_follow_the_algorithm(void **state) {
     const uint32_t sparse = (uint32_t)test_size(100, 5), all = (uint32_t)test_size(140, 7);
     fit_run run;
     size_t gated = 0, bounded = 0, balanced = 0;
-    ovoid_fit_options options = options_for(NULL, sparse, all);
+    ovoid_fit_options options = options_for(sparse, all);
     options.l1.max_error = 0.15; /* so that the gate closes now and then */
     options.l1.epsilon = 0.02;
     run_fit(*state, clump, ATOMS, &options, &run);
@@ -323,7 +323,7 @@ static void gate_can_be_open_or_shut(void **state) {
     for (size_t n = 0; n < 2; ++n) {
         fit_run run;
         ovoid_fit_options options =
-            options_for(NULL, (uint32_t)test_size(40, 3), (uint32_t)test_size(40, 3));
+            options_for((uint32_t)test_size(40, 3), (uint32_t)test_size(40, 3));
         options.l1.max_error = gates[n];
         run_fit(*state, clump, ATOMS, &options, &run);
         /* from the second on: the start may be exact */
@@ -342,7 +342,7 @@ static void accepted_steps_descend(void **state) {
     const ovoid_first_step first_steps[] = {OVOID_FIRST_STEP_SECANT, OVOID_FIRST_STEP_GROW};
     for (size_t which = 0; which < 2; ++which) {
         fit_run run;
-        ovoid_fit_options options = options_for(NULL, sparse, all);
+        ovoid_fit_options options = options_for(sparse, all);
         options.l1.prune_every = UINT32_MAX;
         options.l1.first_step = first_steps[which];
         run_fit(*state, clump, ATOMS, &options, &run);
@@ -370,8 +370,7 @@ static void accepted_steps_descend(void **state) {
 static void pruning_keeps_its_schedule(void **state) {
     test_skip_simulated(*state);
     fit_run run;
-    ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(30, 6), (uint32_t)test_size(30, 6));
+    ovoid_fit_options options = options_for((uint32_t)test_size(30, 6), (uint32_t)test_size(30, 6));
     options.l1.prune_every = (uint32_t)test_size(7, 3);
     options.l1.prune_below = 1.3; /* c begins between 1.28 and 2.06, and the L1 term lowers it */
     options.l1.max_error = INFINITY;
@@ -399,7 +398,7 @@ static void pruning_takes_what_is_below(void **state) {
     const double xyzr[] = {0.0, 0.0, 0.0, 1.8, 3.0, 0.0,  0.0,  0.0, 6.0, 0.0,
                            0.0, 2.0, 9.0, 0.0, 0.0, 0.05, 12.0, 0.0, 0.0, 1.7};
     fit_run run;
-    ovoid_fit_options options = options_for(NULL, 2, 2);
+    ovoid_fit_options options = options_for(2, 2);
     options.spacing = 1.2;
     options.l1.prune_every = 2;
     options.l1.prune_below = 1.5;
@@ -419,7 +418,7 @@ static void pruning_takes_what_is_below(void **state) {
 
 static void pruning_leaves_one(void **state) {
     fit_run run;
-    ovoid_fit_options options = options_for(NULL, 4, 4);
+    ovoid_fit_options options = options_for(4, 4);
     options.l1.prune_every = 3;
     options.l1.prune_below = 1000.0;
     run_fit(*state, clump, ATOMS, &options, &run);
@@ -440,7 +439,7 @@ static void sparse_phase_shrinks_the_l1_term(void **state) {
     test_skip_simulated(*state);
     fit_run run;
     ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(200, 4), (uint32_t)test_size(200, 4));
+        options_for((uint32_t)test_size(200, 4), (uint32_t)test_size(200, 4));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const first = &run.trace.records[0];
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
@@ -458,7 +457,7 @@ static double least_inside(ovoid_context *context, const double *xyzr, size_t at
                            uint32_t inside_every) {
     fit_run run;
     double least = INFINITY, *xyz, *target;
-    ovoid_fit_options options = options_for(NULL, 450, 600);
+    ovoid_fit_options options = options_for(450, 600);
     options.spacing = 1.1;
     options.padding = 3.0;
     options.l1.inside_every = inside_every;
@@ -512,7 +511,7 @@ static void inside_is_held(void **state) {
 static void ends_where_nothing_changes(void **state) {
     test_skip_simulated(*state);
     fit_run run;
-    ovoid_fit_options options = options_for(NULL, 0, 100000);
+    ovoid_fit_options options = options_for(0, 100000);
     options.l1.max_backtracks = (uint32_t)test_size(30, 10);
     run_fit(*state, clump, ATOMS, &options, &run);
     print_message("%zu iterations\n", (size_t)run.result.iterations);
@@ -528,8 +527,7 @@ static void ends_where_nothing_changes(void **state) {
 static void result_is_the_last_record(void **state) {
     test_skip_simulated(*state);
     fit_run run;
-    ovoid_fit_options options =
-        options_for(NULL, (uint32_t)test_size(30, 3), (uint32_t)test_size(50, 5));
+    ovoid_fit_options options = options_for((uint32_t)test_size(30, 3), (uint32_t)test_size(50, 5));
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
     const ovoid_fit_result *const result = &run.result;

@@ -172,7 +172,7 @@ static void test_refusals(void **state) {
     test_refused(context, ovoid_measure(context, molecule, model, &options, &got),
                  OVOID_ERROR_ARGUMENT, "spacing");
     test_refused(context, ovoid_measure(context, NULL, model, &options, &got), OVOID_ERROR_ARGUMENT,
-                 "takes a molecule");
+                 "is NULL");
     assert_int_equal(got.components_original, 42);
     ovoid_molecule_destroy(&molecule);
     ovoid_model_destroy(&model);

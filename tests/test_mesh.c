@@ -316,7 +316,7 @@ static void test_refusals(void **state) {
     test_refused(context, ovoid_mesh_create(context, xyz, tilt, 3, good, 1, &mesh),
                  OVOID_ERROR_ARGUMENT, "vertex 1 of a mesh");
     test_refused(context, ovoid_mesh_create(context, NULL, NULL, 3, good, 1, &mesh),
-                 OVOID_ERROR_ARGUMENT, "arrays");
+                 OVOID_ERROR_ARGUMENT, "is NULL");
     test_refused(context, ovoid_mesh_create(context, xyz, NULL, SIZE_MAX / 2, good, 1, &mesh),
                  OVOID_ERROR_LIMIT, "vertices");
     assert_null(mesh);

@@ -151,6 +151,26 @@ static void each_level_begins_at_once(void **state) {
     erase("\r\033[K");
 }
 
+static ovoid_progress part(const char *stage, uint64_t done, uint64_t total, double seconds) {
+    return (ovoid_progress){.stage = stage, .done = done, .total = total, .seconds = seconds};
+}
+
+/* What is no fit shows its share, and nothing where it is done at once. */
+static void other_work_shows_its_share(void **state) {
+    (void)state;
+    start(false, NULL);
+    show(part("read", 1, 2, 0.4), "");
+    show(part("mesh", 1, 4, 0.5), "\rmesh  25 %  0 s\033[K");
+    show(part("mesh", 2, 4, 2.0), "");
+    clock_seconds += 0.2;
+    show(part("mesh", 2, 3, 2.0), "\rmesh  66 %  2 s\033[K");
+    show(part("open", 0, 0, 3.0), "\ropen  3 s\033[K"); /* nobody knows of how much */
+    show(part("write", 7, 7, 61.0), "\rwrite  100 %  1 min 01 s\033[K");
+    erase("\r\033[K");
+    start(true, NULL);
+    show(part("mesh", 1, 4, 5.0), "");
+}
+
 /* A message takes the line away; the next state brings it back. */
 static void what_was_erased_returns(void **state) {
     (void)state;
@@ -241,6 +261,7 @@ int main(void) {
         cmocka_unit_test_setup(each_stage_is_drawn_at_once, reset),
         cmocka_unit_test_setup(within_a_stage_the_clock_decides, reset),
         cmocka_unit_test_setup(each_level_begins_at_once, reset),
+        cmocka_unit_test_setup(other_work_shows_its_share, reset),
         cmocka_unit_test_setup(what_was_erased_returns, reset),
         cmocka_unit_test_setup(time_left_is_that_of_iterations, reset),
         cmocka_unit_test_setup(narrow_terminals_get_what_fits, reset),

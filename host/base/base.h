@@ -15,6 +15,11 @@ struct ovoid_context {
     char *error; /* last failure, owned, may be NULL */
     ovoid_warning_fn warn;
     void *warn_user;
+    ovoid_progress_fn progress; /* base/progress.h */
+    void *progress_user;
+    ovoid_progress now;                    /* what it is told, but for the seconds */
+    double began;                          /* the outermost work, in ov_seconds() */
+    unsigned works;                        /* public functions at work, one within the other */
     bool profile;                          /* devices begin with their launches counted */
     struct ov_device *device;              /* NULL until opened */
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */
@@ -49,6 +54,14 @@ size_t ov_utf8_length(const unsigned char *text);
 
 /* Seconds of a monotonic clock. */
 double ov_seconds(void);
+
+/* In a public function: refuses an argument that is NULL, naming
+ * both. The context comes first, for there is no telling without it. */
+#define OV_NEED(context, argument)                                                                 \
+    do {                                                                                           \
+        if (!(argument))                                                                           \
+            return ov_fail(context, OVOID_ERROR_ARGUMENT, "%s: %s is NULL", __func__, #argument);  \
+    } while (0)
 
 /* Runs `expression` (an ovoid_status) and jumps to `cleanup` unless it is OVOID_OK; needs a local
  * variable `status`. */

@@ -1,7 +1,11 @@
 #include "base/file.h"
 
+#include "base/progress.h"
+#include "base/temporary.h"
+
 #include <errno.h>
 #include <fcntl.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -117,21 +121,22 @@ static ovoid_status fail_folder(ovoid_context *context, const char *path, const 
 /* Makes an empty file of a name that nobody has, in the folder of target->path. */
 static ovoid_status temporary_create(ovoid_context *context, const char *path,
                                      const ov_target *target, int *descriptor, char **name) {
-    static unsigned counter; /* a clash between threads only costs another try */
+    static atomic_uint counter;
     char last[64];
     for (int i = 0; i < NAME_TRIES; i++) {
         struct timespec now;
         clock_gettime(CLOCK_REALTIME, &now);
-        snprintf(last, sizeof last, ".ovoid-%ld-%u-%lx.tmp", (long)getpid(), counter++,
-                 (unsigned long)now.tv_nsec);
+        snprintf(last, sizeof last, ".ovoid-%ld-%u-%lx.tmp", (long)getpid(),
+                 atomic_fetch_add(&counter, 1), (unsigned long)now.tv_nsec);
         *name = join(context, target->path, folder_length(target->path), last);
         if (!*name)
             return OVOID_ERROR_MEMORY;
+        ov_temporary_begin(*name); /* before it is there */
         *descriptor = open(*name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOCTTY, 0666);
         if (*descriptor >= 0)
             return OVOID_OK;
         int error = errno;
-        free(*name);
+        ov_temporary_end(*name);
         *name = NULL;
         if (error != EEXIST)
             return fail_folder(context, path, target->path, error);
@@ -163,6 +168,7 @@ ovoid_status ov_output_open(ovoid_context *context, const char *path, ov_output 
             OV_TRY(fail_write(context, path, errno));
     } else {
         OV_TRY(temporary_create(context, path, &target, &descriptor, &made.temporary));
+        made.fresh = !target.exists;
         if (target.exists)
             keep_permissions(descriptor, &target.old);
     }
@@ -179,7 +185,7 @@ cleanup:
         close(descriptor);
     if (status != OVOID_OK && made.temporary) {
         unlink(made.temporary);
-        free(made.temporary);
+        ov_temporary_end(made.temporary);
     }
     free(target.path);
     return status;
@@ -216,10 +222,21 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output) {
         *output = (ov_output){0};
         return error ? fail_write(context, "-", error) : OVOID_OK;
     }
+    char *fresh = NULL;
     int error = flush_to_disk(output->stream);
     if (fclose(output->stream) != 0 && !error)
         error = errno;
     output->stream = NULL;
+    if (!error && output->temporary && ov_progress_ask(context) != OVOID_OK) {
+        ov_output_abandon(output);
+        return OVOID_ERROR_CANCELLED;
+    }
+    if (output->temporary && output->fresh) {
+        /* Ended by a handler between here and the return, the process leaves no file either:
+         * syncing a folder can take its time. */
+        fresh = join(NULL, output->path, strlen(output->path), "");
+        ov_temporary_begin(fresh);
+    }
     if (!error && output->temporary && rename(output->temporary, output->path) != 0)
         error = errno;
     ovoid_status status = OVOID_OK;
@@ -227,9 +244,10 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output) {
         status = fail_write(context, output->path, error);
     } else if (output->temporary) {
         sync_folder(output->path);
-        free(output->temporary); /* it has its final name: nothing to remove */
+        ov_temporary_end(output->temporary); /* it has its final name: nothing to remove */
         output->temporary = NULL;
     }
+    ov_temporary_end(fresh);
     ov_output_abandon(output);
     return status;
 }
@@ -239,7 +257,7 @@ void ov_output_abandon(ov_output *output) {
         unlink(output->temporary);
     if (output->stream && output->path)
         fclose(output->stream);
-    free(output->temporary);
+    ov_temporary_end(output->temporary);
     free(output->path);
     *output = (ov_output){0};
 }
@@ -256,7 +274,7 @@ ovoid_status ov_output_check(ovoid_context *context, const char *path) {
     if (name) {
         close(descriptor);
         unlink(name);
-        free(name);
+        ov_temporary_end(name);
     }
     free(target.path);
     return status;
@@ -268,15 +286,20 @@ struct ovoid_file {
     ov_output output;
 };
 
+static ovoid_status fail_finished(ovoid_context *context, const char *function) {
+    return ov_fail(context, OVOID_ERROR_ARGUMENT, "%s: the file is finished", function);
+}
+
 ovoid_status ovoid_file_check(ovoid_context *context, const char *path) {
-    if (!path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_file_check: path is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, path);
     return ov_output_check(context, path);
 }
 
 ovoid_status ovoid_file_create(ovoid_context *context, const char *path, ovoid_file **file) {
-    if (!path || !file)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_file_create: path or file is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, path);
+    OV_NEED(context, file);
     ovoid_file *made = ov_alloc(context, 1, sizeof *made, "an output file");
     if (!made)
         return OVOID_ERROR_MEMORY;
@@ -290,22 +313,22 @@ ovoid_status ovoid_file_create(ovoid_context *context, const char *path, ovoid_f
 
 ovoid_status ovoid_file_write(ovoid_context *context, ovoid_file *file, const void *data,
                               size_t bytes) {
-    if (!file || !file->output.stream || (!data && bytes))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_file_write: no file, a finished one, or no data");
+    OV_NEED(context, context);
+    OV_NEED(context, file);
+    if (bytes)
+        OV_NEED(context, data);
+    if (!file->output.stream)
+        return fail_finished(context, __func__);
     if (fwrite(data, 1, bytes, file->output.stream) == bytes)
         return OVOID_OK;
     return fail_write(context, file->output.path ? file->output.path : "-", errno);
 }
 
-const char *ovoid_file_temporary(const ovoid_file *file) {
-    return file ? file->output.temporary : NULL;
-}
-
 ovoid_status ovoid_file_commit(ovoid_context *context, ovoid_file *file) {
-    if (!file || !file->output.stream)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_file_commit: no file, or a finished one");
+    OV_NEED(context, context);
+    OV_NEED(context, file);
+    if (!file->output.stream)
+        return fail_finished(context, __func__);
     return ov_output_commit(context, &file->output);
 }
 

@@ -12,6 +12,7 @@ typedef struct ov_output {
     FILE *stream;    /* write here */
     char *path;      /* final place; NULL for standard output */
     char *temporary; /* where the bytes go until ov_output_commit() */
+    bool fresh;      /* there was no file in the final place */
 } ov_output;
 
 /* Opens an output; "-" is standard output. Symbolic links are followed and stay. A file that exists

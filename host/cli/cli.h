@@ -48,8 +48,9 @@ const char *cli_last_error(void);
 /* An ovoid_warning_fn; user is a bool: quiet. */
 void cli_on_warning(const char *text, void *quiet);
 
-/* Makes a context whose warnings are printed unless *quiet. False: *code is the exit code, all
- * said. */
+/* Makes a context whose warnings are printed unless *quiet, whose work shows its progress, unless
+ * *quiet, where it takes long, and which a signal stops. False: *code is the exit code, all said.
+ */
 bool cli_context(bool *quiet, ovoid_context **context, int *code);
 
 /* Reports the context's error, unless a signal is behind it, and returns the exit code for
@@ -116,9 +117,11 @@ const char *cli_nearest(const char *text, const char *const *names);
 
 /* ---- interrupt.c ---------------------------------------------------------------------------- */
 
-/* From now on SIGINT, SIGTERM and SIGHUP say so and end the program with 128 + their number.
- * Signals ignored by whoever started the program stay ignored. A closed pipe and a file over the
- * size limit become write errors. */
+/* From now on SIGINT, SIGTERM and SIGHUP stop the work: the library's functions end with
+ * OVOID_ERROR_CANCELLED. What has not ended a moment later, well within a second, ends with the
+ * program, as it does at a second signal; no temporary file stays. The exit code is 128 + the
+ * signal's number. Signals ignored by whoever started the program stay ignored. A closed pipe and a
+ * file over the size limit become write errors. */
 void cli_catch_signals(void);
 
 /* The same again: the compiler of a driver (LLVM in PoCL) puts handlers of its own in their place,
@@ -126,21 +129,28 @@ void cli_catch_signals(void);
  * kernels may have been compiled. */
 void cli_keep_signals(void);
 
-/* From now on, with work under way that has to be stopped in order, the first signal only raises a
- * flag, and a second one kills. */
-void cli_defer_signals(void);
-
 /* Number of the signal that came, 0 for none. */
 int cli_interrupted(void);
 
-/* A file that a killing signal is to remove, NULL for none. The text must live until replaced. */
-void cli_remove_when_killed(const char *path);
+/* Says that the work was interrupted, once. */
+void cli_tell_interrupted(void);
+
+/* Whether from now on work that asks is not stopped any more: what is left is short, and better
+ * whole. */
+void cli_finish_in_any_case(bool on);
+
+/* From now on the context's work shows its progress, unless quiet, and is stopped by a signal. */
+void cli_watch(ovoid_context *context, bool quiet);
+
+/* An ovoid_progress_fn without a user: what cli_watch() does at each call. */
+bool cli_on_progress(const ovoid_progress *progress, void *user);
 
 /* ---- progress.c ----------------------------------------------------------------------------- */
 
-/* Shows the state of a fit in one line of standard error if that is a terminal. `label` begins the
- * line and must outlive it; NULL for none. The first state after a start and the first of each
- * stage are drawn at once, those between at most every tenth of a second of cli_seconds(). */
+/* Shows the state of the work in one line of standard error if that is a terminal. `label` begins
+ * the line and must outlive it; NULL for none. The first state after a start and the first of each
+ * stage are drawn at once, those between at most every tenth of a second of cli_seconds(). What is
+ * no fit is mostly done at once: of it nothing is drawn in the first half second. */
 void cli_progress_start(bool quiet, const char *label);
 void cli_progress_show(const ovoid_progress *progress);
 void cli_progress_erase(void);

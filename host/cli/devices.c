@@ -147,7 +147,8 @@ static int print_json(ovoid_context *context, const ovoid_device_info *devices, 
 /* Index of the device that a fit would take here: the library decides by opening it. */
 static int find_default(ovoid_context *context) {
     if (ovoid_context_open_device(context, NULL) != OVOID_OK) {
-        cli_warning("%s", ovoid_context_error(context));
+        if (!cli_interrupted())
+            cli_warning("%s", ovoid_context_error(context));
         return NONE;
     }
     return (int)ovoid_context_device(context)->index;
@@ -158,11 +159,14 @@ static int list(ovoid_context *context, bool json) {
     size_t count = 0;
     bool quiet = false;
     ovoid_context_on_warning(context, cli_on_warning, &quiet);
+    cli_watch(context, true);
     ovoid_status status = ovoid_devices(context, &devices, &count);
     if (status != OVOID_OK)
         return cli_failure(context, status, CLI_INPUT);
     quiet = true; /* opening a device would repeat the warnings */
     int chosen = count ? find_default(context) : NONE;
+    if (cli_interrupted())
+        return cli_failure(context, OVOID_ERROR_CANCELLED, CLI_INPUT);
     int code = CLI_OK;
     if (json)
         code = print_json(context, devices, count, chosen);

@@ -204,13 +204,6 @@ static bool parse(int argc, char **argv, export_job *job, int *code) {
 
 /* ---- work --------------------------------------------------------------------------------- */
 
-static bool on_progress(uint64_t points, uint64_t total, void *user) {
-    (void)points;
-    (void)total;
-    (void)user;
-    return cli_interrupted() == 0;
-}
-
 static ovoid_export_format format_of(const export_job *job) {
     if (job->numbers.options.format != OVOID_EXPORT_AUTO)
         return job->numbers.options.format;
@@ -221,6 +214,7 @@ static ovoid_export_format format_of(const export_job *job) {
 static void print_summary(const export_job *job) {
     if (job->quiet || strcmp(job->output, "-") == 0)
         return;
+    cli_progress_erase();
     const char *from = source_name(job->input);
     const char *name = ovoid_export_format_name(format_of(job));
     if (job->source.model)
@@ -247,8 +241,6 @@ static int run(export_job *job) {
         status = ovoid_context_open_device(job->context, job->device);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
-    options->progress = on_progress;
-    cli_defer_signals();
     if (job->source.model)
         status = ovoid_model_export(job->context, job->source.model, job->output, options);
     else

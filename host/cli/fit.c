@@ -6,10 +6,8 @@
 
 static bool on_progress(const ovoid_progress *progress, void *user) {
     fit_job *job = user;
-    cli_keep_signals();
     fit_trace_add(&job->tracer, progress);
-    cli_progress_show(progress);
-    return cli_interrupted() == 0;
+    return cli_on_progress(progress, NULL);
 }
 
 static bool goes_to_standard_output(const char *path) {
@@ -94,13 +92,15 @@ static bool check_goal(const fit_job *job) {
 static ovoid_status fit_model(fit_job *job, size_t level) {
     ovoid_fit_options options = job->options;
     fit_level *now = &job->levels[level];
-    options.progress = on_progress;
-    options.user = job;
     if (level > 0) {
         options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
         options.adaptive.ellipsoids = (uint32_t)(now[-1].result.ellipsoids / 2);
     }
-    return ovoid_fit(job->context, job->molecule, &options, &now->model, &now->result);
+    ovoid_context_on_progress(job->context, on_progress, job);
+    const ovoid_status status =
+        ovoid_fit(job->context, job->molecule, &options, &now->model, &now->result);
+    ovoid_context_on_progress(job->context, cli_on_progress, NULL);
+    return status;
 }
 
 static ovoid_status fit_one(fit_job *job, size_t level) {
@@ -112,6 +112,7 @@ static ovoid_status fit_one(fit_job *job, size_t level) {
     cli_progress_start(job->quiet, job->level_count > 1 ? label : job->label);
     ovoid_status status = fit_model(job, level);
     cli_progress_erase();
+    cli_progress_start(job->quiet, job->label);
     if (status == OVOID_OK)
         job->levels_done = level + 1;
     return status;
@@ -121,7 +122,6 @@ static ovoid_status fit_one(fit_job *job, size_t level) {
  * and only sets *code. */
 static ovoid_status fit(fit_job *job, int *code) {
     ovoid_status status = OVOID_OK;
-    cli_defer_signals();
     if (job->trace)
         status = fit_trace_open(&job->tracer, job->context, job->trace, job->options.method);
     if (status == OVOID_OK)
@@ -179,6 +179,8 @@ static ovoid_status write_models(fit_job *job) {
         status = fit_annotate(job, i);
         if (status == OVOID_OK)
             status = ovoid_model_write(job->context, job->levels[i].model, job->levels[i].path);
+        if (status == OVOID_OK)
+            cli_finish_in_any_case(true); /* all of what a fit writes, or nothing */
     }
     return status;
 }
@@ -196,9 +198,8 @@ static int write_owners(fit_job *job) {
 
 /* Writes the models, then the trace and the owners, then the report, which tells how long the
  * others took. The model is worth more than the others: their failure does not undo it. */
-static int write_outputs(fit_job *job) {
+static int write_all(fit_job *job) {
     double begin = cli_seconds();
-    cli_keep_signals();
     ovoid_status status = write_models(job);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
@@ -250,6 +251,12 @@ const char *fit_unreached(const fit_job *job, char text[FIT_REASON_TEXT]) {
         break;
     }
     return text;
+}
+
+static int write_outputs(fit_job *job) {
+    const int code = write_all(job);
+    cli_finish_in_any_case(false);
+    return code;
 }
 
 /* Says what was reached instead of the goal. */

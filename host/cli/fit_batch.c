@@ -93,7 +93,7 @@ static void make_label(const fit_job *asked, size_t index, char *label, size_t s
     snprintf(label, size, "%zu/%zu %.*s", index + 1, asked->input_count, (int)length, name);
 }
 
-static int run_one(batch *b, size_t index) {
+static void run_one(batch *b, size_t index) {
     char label[96];
     fit_job one = *b->asked;
     one.input = one.inputs[index];
@@ -110,8 +110,9 @@ static int run_one(batch *b, size_t index) {
         add_line(b, &one, code);
     }
     cli_message_subject(NULL);
+    cli_progress_erase();
+    cli_progress_start(one.quiet, NULL); /* the label ends here */
     fit_job_destroy(&one);
-    return code;
 }
 
 /* ---- all of them ---------------------------------------------------------------------------- */
@@ -142,7 +143,6 @@ static int prepare(batch *b) {
     }
     if ((status = cli_profile_begin(&asked->profile, asked->context)) != OVOID_OK)
         return cli_failure(asked->context, status, CLI_OUTPUT);
-    cli_defer_signals();
     return CLI_OK;
 }
 
@@ -186,11 +186,11 @@ int fit_batch(fit_job *job) {
     batch b = {.asked = job};
     int code = prepare(&b);
     if (code == CLI_OK) {
-        int last = CLI_OK;
         for (size_t i = 0; i < job->input_count && !cli_interrupted(); i++)
-            last = run_one(&b, i);
-        if (cli_interrupted() && last < 128) /* else it has been said */
-            cli_error("interrupted");
+            run_one(&b, i);
+        if (cli_interrupted())
+            cli_tell_interrupted();
+        cli_finish_in_any_case(true);
         code = finish(&b);
     }
     if (b.lines)

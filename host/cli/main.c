@@ -94,13 +94,14 @@ bool cli_context(bool *quiet, ovoid_context **context, int *code) {
         return false;
     }
     ovoid_context_on_warning(*context, cli_on_warning, quiet);
+    cli_watch(*context, *quiet);
     return true;
 }
 
 int cli_failure(const ovoid_context *context, ovoid_status status, int io) {
     int number = cli_interrupted();
     if (number) {
-        cli_error("interrupted");
+        cli_tell_interrupted();
         return 128 + number;
     }
     const char *text = ovoid_context_error(context);
@@ -290,11 +291,15 @@ int main(int argc, char **argv) {
     if (!isatty(STDOUT_FILENO))
         setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     cli_catch_signals();
+    ovoid_prepare_process();
     int code = run(argc, argv);
     errno = 0;
     if (fflush(stdout) != 0 || ferror(stdout)) {
         /* Whoever asked for the output to be written has reported it already. */
-        if (code == CLI_OK) {
+        if (code == CLI_OK && cli_interrupted()) {
+            cli_tell_interrupted();
+            code = 128 + cli_interrupted();
+        } else if (code == CLI_OK) {
             cli_error("cannot write standard output: %s", strerror(errno ? errno : EIO));
             code = CLI_OUTPUT;
         }

@@ -271,6 +271,7 @@ static void print_after(const measure_job *job) {
     FILE *out = job->summary;
     if (!out)
         return;
+    cli_progress_erase();
     for (size_t i = 0; i < job->row_count; i++) {
         mesh += job->rows[i].measures.seconds_mesh;
         distances += job->rows[i].measures.seconds_distances;
@@ -360,7 +361,6 @@ static int run(measure_job *job) {
         status = cli_profile_end(&job->profile, job->context);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
-    cli_defer_signals(); /* a file under way has to be finished or removed */
     if (job->report && (status = write_report(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     print_after(job);

@@ -18,6 +18,7 @@ typedef struct mesh_job {
     ovoid_context *context;
     source source;
     ovoid_mesh *mesh;
+    double area, volume;
     double started, mesh_seconds;
 } mesh_job;
 
@@ -178,6 +179,7 @@ static void print_before(const mesh_job *job) {
     const ovoid_device_info *device = ovoid_context_device(job->context);
     if (!job->summary)
         return;
+    cli_progress_erase();
     if (job->source.model)
         fprintf(job->summary, "model     %s: %zu ellipsoid%s\n", source_name(job->input),
                 ovoid_model_size(job->source.model),
@@ -196,20 +198,27 @@ static void print_after(const mesh_job *job) {
     size_t outer = 0, components = ovoid_mesh_components(job->mesh);
     if (!out)
         return;
+    cli_progress_erase();
     for (size_t c = 0; c < components; c++)
         outer += ovoid_mesh_component(job->mesh, c)->outer;
-    const bool exact = job->options.vertices == OVOID_VERTEX_EXACT;
     fprintf(out, "surface   isovalue %.9g: %zu piece%s, %zu of them outer\n", job->options.isovalue,
             components, components == 1 ? "" : "s", outer);
     fprintf(out, "mesh      %zu vertices, %zu triangles, spacing %.9g Å, %s vertices\n",
             ovoid_mesh_vertices(job->mesh), ovoid_mesh_triangles(job->mesh), job->options.spacing,
             measures_vertices_name(job->options.vertices));
-    fprintf(out, "area      %.6g Å²\n",
-            exact ? ovoid_mesh_smooth_area(job->mesh) : ovoid_mesh_area(job->mesh));
-    fprintf(out, "volume    %.6g Å³\n",
-            exact ? ovoid_mesh_smooth_volume(job->mesh) : ovoid_mesh_volume(job->mesh));
+    fprintf(out, "area      %.6g Å²\n", job->area);
+    fprintf(out, "volume    %.6g Å³\n", job->volume);
     fprintf(out, "time      %.2f s: mesh %.2f\n", cli_seconds() - job->started, job->mesh_seconds);
     fprintf(out, "mesh      written to %s\n", job->output);
+}
+
+/* Before the mesh is written: a signal that came while these were computed would find its file. */
+static void measure_mesh(mesh_job *job) {
+    const bool exact = job->options.vertices == OVOID_VERTEX_EXACT;
+    if (!job->summary)
+        return;
+    job->area = exact ? ovoid_mesh_smooth_area(job->mesh) : ovoid_mesh_area(job->mesh);
+    job->volume = exact ? ovoid_mesh_smooth_volume(job->mesh) : ovoid_mesh_volume(job->mesh);
 }
 
 static ovoid_status make_mesh(mesh_job *job) {
@@ -245,7 +254,7 @@ static int run(mesh_job *job) {
     print_before(job);
     if ((status = make_mesh(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
-    cli_defer_signals(); /* a file under way has to be finished or removed */
+    measure_mesh(job);
     if ((status = ovoid_mesh_write(job->context, job->mesh, job->output)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     print_after(job);

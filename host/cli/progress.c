@@ -8,7 +8,7 @@
 
 enum { WIDTH_UNKNOWN = 80, WIDTH_MOST = 100, BAR = 20 };
 enum { STAGE_LENGTH = 32 };
-static const double redraw_seconds = 0.1;
+static const double redraw_seconds = 0.1, quick_seconds = 0.5;
 
 static struct {
     bool enabled;
@@ -100,6 +100,22 @@ static void compose_endless(const ovoid_progress *progress, char *text, size_t w
     append(text, width, part);
 }
 
+/* Of what is no fit: the share of this stage that is done, and for how long all has gone on. */
+static void compose_other(const ovoid_progress *progress, char *text, size_t width) {
+    char part[96];
+    if (progress->total > 0) {
+        const double share = (double)progress->done / (double)progress->total;
+        snprintf(part, sizeof part, "%.0f %%", floor(100.0 * fmin(share, 1.0)));
+        append(text, width, part);
+    }
+    cli_print_duration(floor(progress->seconds), part, sizeof part);
+    append(text, width, part);
+}
+
+static bool is_fit(const ovoid_progress *progress) {
+    return progress->ellipsoids > 0 || progress->points > 0;
+}
+
 /* Towards a known number of iterations. */
 static void compose_bounded(const ovoid_progress *progress, char *text, size_t width) {
     char part[96];
@@ -129,7 +145,9 @@ static void compose(const ovoid_progress *progress, char *text, size_t width) {
     if (line.label)
         append(text, width, line.label);
     append(text, width, progress->stage);
-    if (progress->iterations == 0 || progress->iteration == 0)
+    if (!is_fit(progress))
+        compose_other(progress, text, width);
+    else if (progress->iterations == 0 || progress->iteration == 0)
         compose_endless(progress, text, width);
     else
         compose_bounded(progress, text, width);
@@ -138,7 +156,7 @@ static void compose(const ovoid_progress *progress, char *text, size_t width) {
 /* A new stage at once, however short the one before it was: what the screen names is what is under
  * way. Within a stage as often as eyes can follow. */
 void cli_progress_show(const ovoid_progress *progress) {
-    if (!line.enabled)
+    if (!line.enabled || (!is_fit(progress) && progress->seconds < quick_seconds))
         return;
     const double now = cli_seconds();
     const bool new_stage = strncmp(line.stage, progress->stage, STAGE_LENGTH - 1) != 0;

@@ -133,6 +133,7 @@ int reading_list(const reading *r, ovoid_context *context, const char *path) {
     if (status != OVOID_OK)
         return cli_failure(context, status, CLI_INPUT);
     const ovoid_assembly_info *info = ovoid_molecule_assemblies(molecule, &entries);
+    cli_progress_erase();
     printf("%s: %zu atoms in the file\n", source_name(path), ovoid_molecule_atoms(molecule));
     if (entries == 0)
         puts("it describes no assemblies");
@@ -215,6 +216,7 @@ static void print_radii(const reading *r, FILE *out, const ovoid_molecule *molec
 }
 
 void reading_print(const reading *r, FILE *out, const char *path, const ovoid_molecule *molecule) {
+    cli_progress_erase();
     const ovoid_molecule_counts c = ovoid_molecule_read_counts(molecule);
     fprintf(out, "molecule  %s: %llu atom%s", source_name(path), (count)c.atoms, plural(c.atoms));
     if (c.zero_radius)

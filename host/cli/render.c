@@ -421,6 +421,7 @@ static ovoid_status read_inputs(render_job *job) {
 }
 
 static void print_summary(const render_job *job) {
+    cli_progress_erase();
     FILE *const stream = strcmp(job->output, "-") == 0 ? stderr : stdout;
     const ovoid_device_info *const device = ovoid_context_device(job->context);
     if (job->molecule)
@@ -440,7 +441,6 @@ static void print_summary(const render_job *job) {
 }
 
 static int write_picture(render_job *job) {
-    cli_defer_signals(); /* so that no half file stays behind */
     const ovoid_status status = ovoid_image_write(job->context, job->image, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);

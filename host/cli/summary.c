@@ -96,6 +96,7 @@ void fit_summary_after(const fit_job *job) {
     const ovoid_fit_options *options = &job->options;
     const bool l1 = options->method == OVOID_METHOD_L1;
     FILE *out = job->summary;
+    cli_progress_erase();
     if (!out)
         return;
     fprintf(out, "surface   decay %.9g Å⁻², isovalue %.9g\n", options->decay, options->isovalue);

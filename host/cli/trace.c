@@ -23,7 +23,6 @@ ovoid_status fit_trace_open(fit_trace *trace, ovoid_context *context, const char
     ovoid_status status = ovoid_file_create(context, path, &trace->file);
     if (status != OVOID_OK)
         return status;
-    cli_remove_when_killed(ovoid_file_temporary(trace->file));
     if (ovoid_file_write(context, trace->file, header, strlen(header)) != OVOID_OK)
         give_up(trace);
     return OVOID_OK;
@@ -57,12 +56,10 @@ void fit_trace_add(fit_trace *trace, const ovoid_progress *p) {
 void fit_trace_commit(fit_trace *trace) {
     if (!trace->file)
         return;
-    cli_remove_when_killed(NULL);
     if (ovoid_file_commit(trace->context, trace->file) != OVOID_OK)
         give_up(trace);
 }
 
 void fit_trace_destroy(fit_trace *trace) {
-    cli_remove_when_killed(NULL);
     ovoid_file_destroy(&trace->file);
 }

@@ -115,14 +115,16 @@ static cl_int describe(ov_device_entry *entry) {
 /* ---- once per process --------------------------------------------------------------------- */
 
 static pthread_once_t prepared = PTHREAD_ONCE_INIT;
-static char prepare_warning[1024]; /* about PoCL */
+static char prepare_warning[OV_POCL_TEXT]; /* about PoCL */
+static bool pocl_usable;
 static atomic_flag prepare_warned = ATOMIC_FLAG_INIT;
 
-/* The first OpenCL call loads the drivers; it happens here so that the environment is right before
- * they look, and so that no two threads load them at once. */
+/* The first OpenCL call loads the drivers; it happens here so that no two threads load them at
+ * once.
+ */
 static void prepare(void) {
     cl_uint count;
-    ov_pocl_prepare(prepare_warning, sizeof prepare_warning);
+    pocl_usable = ov_pocl_usable(prepare_warning, sizeof prepare_warning);
     clGetPlatformIDs(0, NULL, &count);
 }
 
@@ -161,8 +163,11 @@ static ovoid_status add_platform(ovoid_context *context, list *all, cl_platform_
     const char *call = "clGetPlatformInfo";
     cl_int code = platform_text(platform, CL_PLATFORM_NAME, name, sizeof name);
     if (code == CL_SUCCESS && strcmp(name, OV_POCL_PLATFORM) == 0 && prepare_warning[0] &&
-        context->warn && !atomic_flag_test_and_set(&prepare_warned))
-        ov_warn(context, "%s", prepare_warning);
+        context->warn && (!atomic_flag_test_and_set(&prepare_warned) || !pocl_usable))
+        ov_warn(context, "%s%s",
+                pocl_usable ? "" : "the devices of PoCL are left out: ", prepare_warning);
+    if (code == CL_SUCCESS && strcmp(name, OV_POCL_PLATFORM) == 0 && !pocl_usable)
+        return OVOID_OK;
     if (code == CL_SUCCESS) {
         call = "clGetDeviceIDs";
         code = clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, NULL, &count);
@@ -225,10 +230,9 @@ ovoid_status ovoid_devices(ovoid_context *context, ovoid_device_info **devices, 
     ov_device_entry *entries = NULL;
     ovoid_device_info *infos = NULL;
     size_t found = 0, platforms = 0;
-    if (!context)
-        return OVOID_ERROR_ARGUMENT;
-    if (!devices || !count)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_devices: devices or count is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, devices);
+    OV_NEED(context, count);
     OV_TRY(ov_devices_list(context, &entries, &found, &platforms));
     if (found) {
         infos = ov_alloc(context, found, sizeof *infos, "the list of devices");

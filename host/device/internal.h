@@ -53,15 +53,24 @@ const char *ov_device_type_name(ovoid_device_type type);
 
 #define OV_POCL_PLATFORM "Portable Computing Language"
 
-/* PoCL 3.1 finds no device when it cannot write its own cache folder, and aborts when
- * POCL_CACHE_DIR is empty. Finds out beforehand and, if so, points POCL_CACHE_DIR to a private
- * folder. Call once, before the first OpenCL call. Writes one line for users of PoCL to warning, ""
- * when there is nothing to say. */
-void ov_pocl_prepare(char *warning, size_t size);
+/* PoCL 3.1 finds no device when it cannot write its own cache folder, ends the process when it
+ * cannot run what it has compiled there or when the disk is full, and aborts when POCL_CACHE_DIR is
+ * empty. ovoid_prepare_process() mends that; this says what is so now. False: PoCL had better not
+ * be used. Writes a line for users of PoCL to text (OV_POCL_TEXT bytes),
+ * "" when there is nothing to say. */
+bool ov_pocl_usable(char *text, size_t size);
+
+#define OV_PATH_SIZE 4096
+#define OV_POCL_REASON 128 /* bytes of what is wrong with a folder */
+#define OV_POCL_TEXT (2 * OV_PATH_SIZE + 512)
+
+/* Whether a driver that failed to compile may have met a full disk: text (OV_POCL_TEXT bytes) says
+ * where. */
+bool ov_full_disk(char *text, size_t size);
 
 /* Makes, or finds, the folder <base>/ovoid-pocl-<user id> that nobody else can have made or can
  * reach. False when base is no absolute path, or what is there is another's, open to others, a
- * link, or cannot be written. */
+ * link, full, or cannot be written, or when programs cannot run there. */
 bool ov_private_folder(const char *base, char *path, size_t size);
 
 /* Creates a folder and those above it, mode 0700 each. False with errno when that fails. */

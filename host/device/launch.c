@@ -1,5 +1,7 @@
 #include "device/internal.h"
 
+#include "base/progress.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -33,6 +35,8 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     if (!context->device || !kernel->handle)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "a kernel was launched before it was made");
     ovoid_status status = check_launch(context, kernel, global, local, arg_count);
+    if (status == OVOID_OK)
+        status = ov_progress_ask(context);
     if (status != OVOID_OK)
         return status;
     for (size_t i = 0; i < arg_count; i++) {

@@ -1,5 +1,7 @@
 #include "device/internal.h"
 
+#include "base/progress.h"
+
 #include "shared.h"
 
 #include <ctype.h>
@@ -273,8 +275,9 @@ ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selec
     const ov_device_entry *entry = NULL;
     ov_device *device = NULL;
     size_t count = 0, platforms = 0;
-    if (!context)
-        return OVOID_ERROR_ARGUMENT;
+    OV_NEED(context, context);
+    ov_progress_begin(context, "open");
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_devices_list(context, &entries, &count, &platforms));
     OV_TRY(choose(context, selector, entries, count, platforms, &entry));
     OV_TRY(make_device(context, entry, &device));
@@ -283,6 +286,7 @@ ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selec
     context->close_device = ov_device_close;
 cleanup:
     free(entries);
+    ov_progress_end(context);
     return status;
 }
 

@@ -1,3 +1,4 @@
+#define _GNU_SOURCE /* ST_NOEXEC */
 #include "device/internal.h"
 
 #include <errno.h>
@@ -5,12 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
-#define PATH_SIZE 4096
-
 bool ov_make_folders(const char *path) {
-    char part[PATH_SIZE];
+    char part[OV_PATH_SIZE];
     size_t length = strlen(path);
     if (!length || length >= sizeof part) {
         errno = length ? ENAMETOOLONG : ENOENT;
@@ -35,11 +35,26 @@ bool ov_make_folders(const char *path) {
     return false;
 }
 
+/* What PoCL writes while it compiles all kernels, and more. */
+#define ROOM ((double)(16 << 20)) /* bytes */
+
+/* 0 is as good as not known. */
+static double room_in(const char *folder) {
+    struct statvfs disk;
+    return statvfs(folder, &disk) == 0 ? (double)disk.f_bavail * (double)disk.f_frsize : 0.0;
+}
+
+/* PoCL loads what it has compiled as a library. */
+static bool forbids_programs(const char *folder) {
+    struct statvfs disk;
+    return statvfs(folder, &disk) == 0 && (disk.f_flag & ST_NOEXEC);
+}
+
 /* Whether a file can be written there, with room on the disk for a page. */
 static bool can_write(const char *folder) {
     static const char page[4096];
-    char path[PATH_SIZE + 32];
-    if (strlen(folder) >= PATH_SIZE) {
+    char path[OV_PATH_SIZE + 32];
+    if (strlen(folder) >= OV_PATH_SIZE) {
         errno = ENAMETOOLONG;
         return false;
     }
@@ -58,11 +73,10 @@ static bool can_write(const char *folder) {
     return written == (ssize_t)sizeof page;
 }
 
-/* Whether a folder can be written, or made where it does not exist yet; makes nothing. */
-static bool can_make(const char *folder) {
-    char path[PATH_SIZE];
+/* The folder, or that above it which exists, as it has to be made; false: out of reach. */
+static bool find_existing(const char *folder, char path[OV_PATH_SIZE]) {
     struct stat info;
-    if (strlen(folder) >= sizeof path) {
+    if (strlen(folder) >= OV_PATH_SIZE) {
         errno = ENAMETOOLONG;
         return false;
     }
@@ -78,7 +92,26 @@ static bool can_make(const char *folder) {
         else
             *slash = '\0';
     }
-    return can_write(path);
+    return true;
+}
+
+/* What is wrong with a folder for PoCL's cache, which need not exist yet; "" when nothing is. Makes
+ * nothing. *usable: it is only short of room, and what it needs may be there already. */
+static void judge_folder(const char *folder, char reason[OV_POCL_REASON], bool *usable) {
+    char path[OV_PATH_SIZE];
+    *usable = false;
+    reason[0] = '\0';
+    if (folder[0] == '\0')
+        snprintf(reason, OV_POCL_REASON, "its name is empty");
+    else if (!find_existing(folder, path) || (!can_write(path) && errno != ENOSPC))
+        snprintf(reason, OV_POCL_REASON, "cannot be written: %s", strerror(errno));
+    else if (forbids_programs(path))
+        snprintf(reason, OV_POCL_REASON,
+                 "is on a file system that is mounted noexec, where programs cannot run");
+    else if (room_in(path) < ROOM)
+        snprintf(reason, OV_POCL_REASON, "is on a full disk: %.3g MiB are left",
+                 room_in(path) / (1 << 20));
+    *usable = reason[0] == '\0' || strstr(reason, "full disk") != NULL;
 }
 
 /* A folder that only this user can have made: not a link, ours, closed to others. */
@@ -109,29 +142,59 @@ bool ov_private_folder(const char *base, char *path, size_t size) {
     if (!base || base[0] != '/')
         return false;
     int length = snprintf(path, size, "%s/ovoid-pocl-%ld", base, (long)geteuid());
-    return length > 0 && (size_t)length < size && make_private(path) && can_write(path);
+    return length > 0 && (size_t)length < size && make_private(path) && can_write(path) &&
+           !forbids_programs(path) && room_in(path) >= ROOM;
 }
 
-void ov_pocl_prepare(char *warning, size_t size) {
-    char wanted[PATH_SIZE], taken[PATH_SIZE];
-    warning[0] = '\0';
+static bool find_replacement(char *path, size_t size) {
+    const char *const bases[] = {getenv("TMPDIR"), "/tmp", "/var/tmp", "/dev/shm"};
+    for (size_t i = 0; i < sizeof bases / sizeof *bases; i++)
+        if (ov_private_folder(bases[i], path, size))
+            return true;
+    return false;
+}
+
+/* What ovoid_prepare_process() has done. */
+static char replaced[OV_POCL_TEXT];
+
+void ovoid_prepare_process(void) {
+    char wanted[OV_PATH_SIZE], taken[OV_PATH_SIZE], reason[OV_POCL_REASON];
+    bool usable;
     const char *own = getenv("POCL_CACHE_DIR");
     if (own && !*own)
         unsetenv("POCL_CACHE_DIR");
     pocl_folder(wanted, sizeof wanted);
-    if (can_make(wanted))
-        return;
-    const char *reason = strerror(errno);
-    bool found = ov_private_folder(getenv("TMPDIR"), taken, sizeof taken) ||
-                 ov_private_folder("/tmp", taken, sizeof taken) ||
-                 ov_private_folder("/dev/shm", taken, sizeof taken);
-    if (found && setenv("POCL_CACHE_DIR", taken, 1) == 0)
-        snprintf(warning, size,
-                 "PoCL's cache folder %s cannot be written (%s); it uses %s for this run", wanted,
-                 reason, taken);
-    else
-        snprintf(warning, size,
-                 "PoCL's cache folder %s cannot be written (%s) and neither can a replacement; "
-                 "PoCL may show no device",
+    judge_folder(wanted, reason, &usable);
+    if (reason[0] && find_replacement(taken, sizeof taken) &&
+        setenv("POCL_CACHE_DIR", taken, 1) == 0)
+        snprintf(replaced, sizeof replaced, "PoCL's cache folder %s %s; it uses %s for this run",
+                 wanted, reason, taken);
+}
+
+bool ov_pocl_usable(char *text, size_t size) {
+    char wanted[OV_PATH_SIZE], reason[OV_POCL_REASON];
+    bool usable;
+    pocl_folder(wanted, sizeof wanted);
+    judge_folder(wanted, reason, &usable);
+    if (reason[0])
+        snprintf(text, size, "PoCL's cache folder %s %s; POCL_CACHE_DIR can name another one",
                  wanted, reason);
+    else
+        snprintf(text, size, "%s", replaced);
+    return usable;
+}
+
+bool ov_full_disk(char *text, size_t size) {
+    char folders[2][OV_PATH_SIZE], path[OV_PATH_SIZE];
+    const char *const temporary = getenv("TMPDIR");
+    snprintf(folders[0], OV_PATH_SIZE, "%s", temporary && *temporary ? temporary : "/tmp");
+    pocl_folder(folders[1], OV_PATH_SIZE);
+    for (int i = 0; i < 2; i++)
+        if (find_existing(folders[i], path) && room_in(path) < ROOM) {
+            snprintf(text, size, "the disk with %s '%s' is full: %.3g MiB are left",
+                     i ? "PoCL's cache folder" : "the folder for temporary files", folders[i],
+                     room_in(path) / (1 << 20));
+            return true;
+        }
+    return false;
 }

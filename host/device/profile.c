@@ -152,8 +152,7 @@ cleanup:
 
 ovoid_status ovoid_context_profile(ovoid_context *context, bool on) {
     ovoid_status status = OVOID_OK;
-    if (!context)
-        return OVOID_ERROR_ARGUMENT;
+    OV_NEED(context, context);
     if (context->device)
         status = on ? ov_profile_start(context, context->device) : stop(context, context->device);
     if (status == OVOID_OK)
@@ -176,11 +175,9 @@ static int compare(const void *left, const void *right) {
 
 ovoid_status ovoid_context_kernel_times(ovoid_context *context, ovoid_kernel_time **times,
                                         size_t *count) {
-    if (!context)
-        return OVOID_ERROR_ARGUMENT;
-    if (!times || !count)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_context_kernel_times: times or count is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, times);
+    OV_NEED(context, count);
     const ov_profile *profile = context->device ? context->device->profile : NULL;
     ovoid_kernel_time *copy = NULL;
     if (profile && profile->count) {

@@ -1,5 +1,7 @@
 #include "device/internal.h"
 
+#include "base/progress.h"
+
 #include "shared.h"
 
 #include <stdio.h>
@@ -177,12 +179,15 @@ static void read_log(ovoid_context *context, const ov_device *device, cl_program
 static ovoid_status fail_build(ovoid_context *context, const ov_device *device, const char *stem,
                                cl_program handle, cl_int code, const char *options) {
     ov_text log = {0};
+    char disk[OV_POCL_TEXT] = "";
     read_log(context, device, handle, &log);
+    if (ov_full_disk(disk, sizeof disk - 1))
+        strcat(disk, "\n");
     ovoid_status status =
         ov_fail(context, OVOID_ERROR_OPENCL,
-                "clBuildProgram: %s (%d), program %s.cl, device %s, driver %s\noptions: %s\n%s",
-                ov_cl_name(code), (int)code, stem, device->info.name, device->info.driver, options,
-                log.length ? log.text : "(no build log)");
+                "%sclBuildProgram: %s (%d), program %s.cl, device %s, driver %s\noptions: %s\n%s",
+                disk, ov_cl_name(code), (int)code, stem, device->info.name, device->info.driver,
+                options, log.length ? log.text : "(no build log)");
     free(log.text);
     return status;
 }
@@ -263,7 +268,11 @@ static ovoid_status get_program(ovoid_context *context, ov_device *device, const
     struct ov_program *program = ov_alloc(context, 1, sizeof *program, "a program");
     if (!program)
         return OVOID_ERROR_MEMORY;
-    ovoid_status status = make_program(context, device, stem, &program->handle);
+    const char *const before = ov_progress_stage(context, "compile");
+    ovoid_status status = ov_progress_ask(context);
+    if (status == OVOID_OK)
+        status = make_program(context, device, stem, &program->handle);
+    ov_progress_stage(context, before);
     if (status != OVOID_OK) {
         free(program);
         return status;

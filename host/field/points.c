@@ -1,5 +1,7 @@
 #include "field/field.h"
 
+#include "base/progress.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -135,7 +137,9 @@ static ovoid_status order_points(ovoid_context *context, const double *xyz, size
         }
         keys[k] = ov_hilbert_index(at[0], at[1], at[2], bits);
     }
-    const ovoid_status status = ov_sort_keys(context, keys, count, order);
+    ovoid_status status = ov_progress_ask(context);
+    if (status == OVOID_OK)
+        status = ov_sort_keys(context, keys, count, order);
     free(keys);
     return status;
 }
@@ -288,6 +292,7 @@ static ovoid_status make_packs(ovoid_context *context, const cutter *c, ov_point
         goto cleanup;
     }
     pack_points(c, points, packed);
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_points_upload(context, packed, points));
 cleanup:
     free(packed);
@@ -307,6 +312,7 @@ ovoid_status ov_points_create(ovoid_context *context, const double *xyz, size_t 
     const cutter c = {
         .xyz = xyz, .curve = curve, .count = count, .longest = longest_side(resolution)};
     OV_TRY(order_points(context, xyz, count, resolution, curve));
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(make_packs(context, &c, &made));
 cleanup:
     free(curve);

@@ -1,5 +1,7 @@
 #include "fit/adaptive_parts.h"
 
+#include "base/progress.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,11 +18,8 @@
 
 static bool report_sampling(uint64_t points, void *user) {
     ov_adaptive *const f = user;
-    const ovoid_progress progress = {.stage = "sample",
-                                     .ellipsoids = f->atoms,
-                                     .points = points,
-                                     .seconds = ov_seconds() - f->began};
-    return !f->options->progress || f->options->progress(&progress, f->options->user);
+    const ovoid_progress progress = {.stage = "sample", .ellipsoids = f->atoms, .points = points};
+    return ov_progress_report(f->context, &progress);
 }
 
 /* Small molecules have few points at any spacing, and so few that more of them help. The field of
@@ -219,7 +218,6 @@ ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t 
                      .xyzr = xyzr,
                      .atoms = atoms,
                      .options = options,
-                     .began = began,
                      .refiner = {.context = context},
                      .local = {.refiner = {.context = context}}};
     if (options->adaptive.goal == OVOID_GOAL_ELLIPSOIDS && options->adaptive.ellipsoids > atoms)

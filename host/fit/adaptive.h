@@ -7,7 +7,7 @@
 
 /* Fits to the molecule's surface. *ellipsoids and *owner, the ellipsoid of each atom, are
  * allocated (free with free()); result's counts, errors and profile are filled in. Seconds in
- * progress count from began. A goal that is not reached is no error: result says so, and the model
+ * result count from began. A goal that is not reached is no error: result says so, and the model
  * is the best there was. */
 ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                              const ovoid_fit_options *options, double began,

@@ -1,5 +1,7 @@
 #include "fit/adaptive_parts.h"
 
+#include "base/progress.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,9 +62,8 @@ bool ov_adaptive_report(void *fit) {
                                      .points = f->samples.points.count,
                                      .accuracy_term = f->misfit,
                                      .accuracy_weight = 1.0,
-                                     .objective = f->misfit,
-                                     .seconds = ov_seconds() - f->began};
-    return !f->options->progress || f->options->progress(&progress, f->options->user);
+                                     .objective = f->misfit};
+    return ov_progress_report(f->context, &progress);
 }
 
 static bool report_step(uint32_t step, double misfit, void *user) {
@@ -145,6 +146,7 @@ ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial
     ovoid_status status = OVOID_OK;
     f->stage = "merge";
     if (!f->reduction[kind]) {
+        ov_progress_stage(f->context, f->stage);
         for (size_t i = 0; i < f->atoms; ++i)
             ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &f->quadrics[i]);
         OV_TRY(ov_reduction_create(f->context, f->quadrics, f->atoms, 1, &starts[kind],

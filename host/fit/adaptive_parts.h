@@ -32,7 +32,6 @@ typedef struct ov_adaptive {
     ov_judge judge;
     double spacing; /* of the points */
     const char *stage;
-    double began;
     uint64_t steps; /* refinement steps so far */
     size_t count;   /* ellipsoids being worked on */
     double misfit;

@@ -1,3 +1,4 @@
+#include "base/progress.h"
 #include "fit/adaptive.h"
 #include "fit/l1.h"
 #include "fit/model.h"
@@ -7,32 +8,29 @@
 #include <stdlib.h>
 
 typedef struct sampling_report {
-    const ovoid_fit_options *options;
+    ovoid_context *context;
+    uint64_t iterations;
     size_t atoms;
-    double began;
 } sampling_report;
 
 static bool report_sampling(uint64_t points, void *user) {
     const sampling_report *const report = user;
-    const ovoid_fit_options *const options = report->options;
     const ovoid_progress progress = {.stage = "sample",
-                                     .iterations = options->l1.iterations,
+                                     .iterations = report->iterations,
                                      .ellipsoids = report->atoms,
-                                     .points = points,
-                                     .seconds = ov_seconds() - report->began};
-    return !options->progress || options->progress(&progress, options->user);
+                                     .points = points};
+    return ov_progress_report(report->context, &progress);
 }
 
 /* Section 3.2.2 of the paper: |phi - c| <= 1; and what holds the inside, beyond the paper. */
 static ovoid_status sample_band(ovoid_context *context, const ovoid_molecule *molecule,
-                                const ovoid_fit_options *options, double began,
-                                ov_samples *samples) {
+                                const ovoid_fit_options *options, ov_samples *samples) {
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const ov_band band = {.low = options->isovalue - 1.0,
                           .high = options->isovalue + 1.0,
                           .inside_every = options->l1.inside_every};
-    sampling_report report = {.options = options, .atoms = atoms, .began = began};
+    sampling_report report = {context, options->l1.iterations, atoms};
     const ov_sampling sampling = {.go_on = report_sampling, .user = &report};
     ov_lattice lattice;
     const double spacing = options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1;
@@ -49,13 +47,13 @@ static ovoid_status fit_l1(ovoid_context *context, const ovoid_molecule *molecul
                            ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_samples samples = {0};
-    OV_TRY(sample_band(context, molecule, options, began, &samples));
+    OV_TRY(sample_band(context, molecule, options, &samples));
     result->sample_seconds = ov_seconds() - began;
     result->spacing = options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1;
     result->reached = true;
     result->distance = NAN;
     OV_TRY(ov_l1_fit(context, ovoid_molecule_xyzr(molecule), ovoid_molecule_atoms(molecule),
-                     &samples, options, began, ellipsoids, owner, result));
+                     &samples, options, ellipsoids, owner, result));
 cleanup:
     ov_samples_destroy(&samples);
     return status;
@@ -70,11 +68,15 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
     ovoid_model *made = NULL;
     ovoid_fit_result done = {0};
     ov_device *device;
-    if (!context || !molecule || !options || !model)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_fit: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, options);
+    OV_NEED(context, model);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const double began = ov_seconds();
+    ov_progress_begin(context, "sample");
+    context->now.ellipsoids = atoms;
     OV_TRY(ov_fit_options_check(context, options));
     OV_TRY(ov_atoms_check(context, xyzr, atoms, options->decay));
     OV_TRY(ov_device_get(context, &device));
@@ -92,5 +94,6 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
 cleanup:
     free(ellipsoids);
     free(owner);
+    ov_progress_end(context);
     return status;
 }

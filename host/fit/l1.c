@@ -1,5 +1,7 @@
 #include "fit/l1.h"
 
+#include "base/progress.h"
+
 #include "fit/l1_objective.h"
 #include "fit/owner.h"
 
@@ -125,9 +127,9 @@ cleanup:
 }
 
 static bool report(const fit *f, uint64_t iteration, bool accuracy_phase, ov_l1_weights w,
-                   ov_l1_evaluation now, double tau, double began) {
-    if (!f->options->progress)
-        return true;
+                   ov_l1_evaluation now, double tau) {
+    if (!f->objective.context->progress)
+        return true; /* the sum below is worth sparing */
     const double sparse = ov_l1_sparse_term(&f->objective, f->x, f->count);
     const ovoid_progress progress = {
         .stage = accuracy_phase ? "accuracy" : "sparse",
@@ -142,14 +144,13 @@ static bool report(const fit *f, uint64_t iteration, bool accuracy_phase, ov_l1_
         .objective = w.accuracy * now.accuracy + w.sparse * sparse,
         .max_error = now.max_error,
         .step = tau,
-        .seconds = ov_seconds() - began,
     };
-    return f->options->progress(&progress, f->options->user);
+    return ov_progress_report(f->objective.context, &progress);
 }
 
 /* Algorithm 1, step 5. A phase ends early when two searches in a row, the second one with a fresh
  * first step, find no descent: nothing would change any more. */
-static ovoid_status iterate(fit *f, double began, ov_l1_evaluation *now, uint64_t *iterations) {
+static ovoid_status iterate(fit *f, ov_l1_evaluation *now, uint64_t *iterations) {
     ovoid_status status = OVOID_OK;
     const ovoid_l1_options *const l1 = &f->options->l1;
     uint64_t sparse_end = l1->sparse_iterations;
@@ -173,7 +174,7 @@ static ovoid_status iterate(fit *f, double began, ov_l1_evaluation *now, uint64_
         *iterations = n;
         failures = tau > 0.0 ? 0 : failures + 1;
         alone_before = alone && tau > 0.0;
-        if (!report(f, n, accuracy_phase, w, *now, tau, began)) {
+        if (!report(f, n, accuracy_phase, w, *now, tau)) {
             status = ov_fail(f->objective.context, OVOID_ERROR_CANCELLED,
                              "stopped at iteration %llu of %lu", (unsigned long long)n,
                              (unsigned long)l1->iterations);
@@ -267,7 +268,7 @@ static ovoid_status find_owners(const fit *f, const double *xyzr, size_t atoms, 
 }
 
 ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
-                       const ov_samples *samples, const ovoid_fit_options *options, double began,
+                       const ov_samples *samples, const ovoid_fit_options *options,
                        ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
@@ -277,7 +278,7 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     const uint64_t launches = device->launches;
     OV_TRY(allocate(&f, context, samples));
     initialise(&f, xyzr);
-    OV_TRY(iterate(&f, began, &last, &result->iterations));
+    OV_TRY(iterate(&f, &last, &result->iterations));
     OV_TRY(find_owners(&f, xyzr, atoms, owner));
     OV_TRY(hand_over(&f, ellipsoids));
     result->points = samples->points.count;

@@ -37,9 +37,10 @@ static ovoid_status check_ellipsoid(ovoid_context *context, const ovoid_ellipsoi
 
 ovoid_status ovoid_model_create(ovoid_context *context, const ovoid_ellipsoid *ellipsoids,
                                 size_t count, double decay, double isovalue, ovoid_model **model) {
-    if (!model || (!ellipsoids && count))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_model_create: model or ellipsoids is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    if (count)
+        OV_NEED(context, ellipsoids);
     if (!count)
         return ov_fail(context, OVOID_ERROR_EMPTY, "a model needs at least one ellipsoid");
     if (!isfinite(decay) || decay <= 0.0)
@@ -146,9 +147,10 @@ ovoid_status ov_model_add_note(ovoid_context *context, ovoid_model *model, const
 
 ovoid_status ovoid_model_annotate(ovoid_context *context, ovoid_model *model, const char *key,
                                   const char *value) {
-    if (!model || !key || !value)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_model_annotate: model, key or value is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    OV_NEED(context, key);
+    OV_NEED(context, value);
     if (!ov_model_key_valid(key))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "'%s' cannot be the key of a model's header line", key);

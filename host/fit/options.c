@@ -1,6 +1,7 @@
 #include "fit/options.h"
 
 #include <math.h>
+#include <stdio.h>
 
 void ovoid_fit_options_init(ovoid_fit_options *options) {
     if (!options)
@@ -42,64 +43,85 @@ void ovoid_fit_options_init(ovoid_fit_options *options) {
 
 typedef struct range {
     const char *name;
-    double value, low, high; /* low < value <= high */
+    double value, low, high;
+    bool above; /* low itself is not allowed */
 } range;
 
+/* What a value outside its range would have to be, in words. */
+static ovoid_status fail_range(ovoid_context *context, const range *r) {
+    char wanted[64];
+    if (isnan(r->value))
+        snprintf(wanted, sizeof wanted, "be a number");
+    else if (r->value > r->low)
+        snprintf(wanted, sizeof wanted, "be at most %.9g", r->high);
+    else if (r->low == 0.0 && !r->above)
+        snprintf(wanted, sizeof wanted, "not be negative");
+    else
+        snprintf(wanted, sizeof wanted, "be %s %.9g", r->above ? "above" : "at least", r->low);
+    return ov_fail(context, OVOID_ERROR_ARGUMENT, "option %s must %s; it is %.9g", r->name, wanted,
+                   r->value);
+}
+
 static ovoid_status check_ranges(ovoid_context *context, const range *ranges, size_t count) {
-    for (size_t k = 0; k < count; ++k)
-        if (!(ranges[k].value > ranges[k].low && ranges[k].value <= ranges[k].high))
-            return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                           "option %s = %g is not above %g and at most %g", ranges[k].name,
-                           ranges[k].value, ranges[k].low, ranges[k].high);
+    for (size_t k = 0; k < count; ++k) {
+        const range *const r = &ranges[k];
+        if (!(r->above ? r->value > r->low : r->value >= r->low) || !(r->value <= r->high))
+            return fail_range(context, r);
+    }
     return OVOID_OK;
 }
 
 static ovoid_status check_adaptive(ovoid_context *context, const ovoid_adaptive_options *adaptive) {
     const range ranges[] = {
-        {"tolerance", adaptive->tolerance, 0.0, 1e3},
-        {"ratio", adaptive->ratio, 0.0, 1.0},
-        {"effort", adaptive->effort, 0.0, 10.0},
-        {"mesh_spacing", adaptive->mesh_spacing, 0.0, 1e3},
+        {"tolerance", adaptive->tolerance, 0.0, 1e3, true},
+        {"ratio", adaptive->ratio, 0.0, 1.0, true},
+        {"effort", adaptive->effort, 1.0, 10.0, false},
+        {"mesh_spacing", adaptive->mesh_spacing, 0.0, 1e3, true},
     };
     if (adaptive->goal != OVOID_GOAL_TOLERANCE && adaptive->goal != OVOID_GOAL_ELLIPSOIDS &&
         adaptive->goal != OVOID_GOAL_RATIO)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown goal %d", (int)adaptive->goal);
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option goal must be one of OVOID_GOAL_...; it is %d", (int)adaptive->goal);
     if (adaptive->goal == OVOID_GOAL_ELLIPSOIDS && adaptive->ellipsoids == 0)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "a model has at least one ellipsoid");
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option ellipsoids must be at least 1; it is 0");
     return check_ranges(context, ranges, sizeof ranges / sizeof *ranges);
 }
 
 static ovoid_status check_l1(ovoid_context *context, const ovoid_l1_options *l1) {
     const range ranges[] = {
-        {"iterations", l1->iterations, 0.0, UINT32_MAX},
-        {"epsilon", l1->epsilon, 0.0, 1.0},
-        {"max_error", l1->max_error, 0.0, INFINITY},
-        {"prune_below", l1->prune_below, -1e-300, 1e3},
-        {"prune_every", l1->prune_every, 0.0, UINT32_MAX},
-        {"armijo", l1->armijo, 0.0, 0.999},
-        {"shrink", l1->shrink, 0.0, 0.999},
-        {"grow", l1->grow, 0.999, 1e6},
-        {"max_backtracks", l1->max_backtracks, 0.0, 1000.0},
+        {"iterations", l1->iterations, 1.0, UINT32_MAX, false},
+        {"epsilon", l1->epsilon, 0.0, 1.0, true},
+        {"max_error", l1->max_error, 0.0, INFINITY, true},
+        {"prune_below", l1->prune_below, 0.0, 1e3, false},
+        {"prune_every", l1->prune_every, 1.0, UINT32_MAX, false},
+        {"armijo", l1->armijo, 0.0, 0.999, true},
+        {"shrink", l1->shrink, 0.0, 0.999, true},
+        {"grow", l1->grow, 1.0, 1e6, false},
+        {"max_backtracks", l1->max_backtracks, 1.0, 1000.0, false},
     };
     if (l1->kernel != OVOID_KERNEL_ELLIPSOID && l1->kernel != OVOID_KERNEL_SPHERE)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown kernel %d", (int)l1->kernel);
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option kernel must be one of OVOID_KERNEL_...; it is %d", (int)l1->kernel);
     if (l1->first_step != OVOID_FIRST_STEP_SECANT && l1->first_step != OVOID_FIRST_STEP_GROW)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown first step %d", (int)l1->first_step);
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option first_step must be one of OVOID_FIRST_STEP_...; it is %d",
+                       (int)l1->first_step);
     const ovoid_status status = check_ranges(context, ranges, sizeof ranges / sizeof *ranges);
     if (status == OVOID_OK && l1->sparse_iterations > l1->iterations)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "option sparse_iterations = %lu is more than iterations = %lu",
-                       (unsigned long)l1->sparse_iterations, (unsigned long)l1->iterations);
+                       "option sparse_iterations must be at most iterations, %lu; it is %lu",
+                       (unsigned long)l1->iterations, (unsigned long)l1->sparse_iterations);
     return status;
 }
 
 /* Options of the method that is not used are not looked at. */
 ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_options *options) {
     const range ranges[] = {
-        {"decay", options->decay, 0.0, 100.0},
-        {"isovalue", options->isovalue, 0.0, 1e6},
-        {"spacing", options->spacing, -1e-300, 1e3},
-        {"padding", options->padding, -1e-300, 1e3},
+        {"decay", options->decay, 0.0, 100.0, true},
+        {"isovalue", options->isovalue, 0.0, 1e6, true},
+        {"spacing", options->spacing, 0.0, 1e3, false},
+        {"padding", options->padding, 0.0, 1e3, false},
     };
     const ovoid_status status = check_ranges(context, ranges, sizeof ranges / sizeof *ranges);
     if (status != OVOID_OK)
@@ -110,5 +132,6 @@ ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_option
     case OVOID_METHOD_L1:
         return check_l1(context, &options->l1);
     }
-    return ov_fail(context, OVOID_ERROR_ARGUMENT, "unknown method %d", (int)options->method);
+    return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                   "option method must be one of OVOID_METHOD_...; it is %d", (int)options->method);
 }

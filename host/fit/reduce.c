@@ -1,5 +1,7 @@
 #include "fit/reduce.h"
 
+#include "base/progress.h"
+
 #include "fit/reduce_cells.h"
 #include "fit/reduce_component.h"
 #include "fit/reduce_field.h"
@@ -171,6 +173,11 @@ static size_t nodes_count(const ov_reduction *reduction) {
     return reduction->count + reduction->merges;
 }
 
+/* A turn takes some microseconds, and more where Gaussians lie close. */
+static ovoid_status ask(const reducer *r, uint64_t turn) {
+    return turn & 0x3ff ? OVOID_OK : ov_progress_ask(r->context);
+}
+
 /* All pairs of the nodes alive within reach. */
 static ovoid_status gather(reducer *r, double reach) {
     ovoid_status status = OVOID_OK;
@@ -181,6 +188,7 @@ static ovoid_status gather(reducer *r, double reach) {
     r->entries = 0;
     for (uint32_t k = 0; k < nodes_count(reduction); ++k)
         if (reduction->parent[k] == NONE) {
+            OV_TRY(ask(r, k));
             look_and_push(r, k); /* at those before it */
             OV_TRY(ov_grid_add(r->context, &r->grid, reduction->nodes[k].mean, k));
         }
@@ -229,6 +237,7 @@ static ovoid_status reduce(reducer *r, size_t down_to) {
     OV_TRY(gather(r, reach));
     while (r->reduction->count - r->reduction->merges > down_to) {
         bool merged;
+        OV_TRY(ask(r, r->reduction->merges));
         OV_TRY(merge_cheapest(r, &merged));
         if (!merged) {
             reach *= 2.0;

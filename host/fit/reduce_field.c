@@ -1,5 +1,7 @@
 #include "fit/reduce_field.h"
 
+#include "base/progress.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -173,8 +175,11 @@ ovoid_status ov_start_field_create(ovoid_context *context, const ov_quadric *sta
     field->spacing = spacing_of(components, count);
     OV_TRY(ov_cells_create(context, start[0].centre, INTERVALS * field->spacing, count / 8,
                            &field->bricks));
-    for (size_t k = 0; k < count; ++k)
+    for (size_t k = 0; k < count; ++k) {
+        if ((k & 0x3ff) == 0)
+            OV_TRY(ov_progress_ask(context));
         OV_TRY(add_gaussian(context, field, start + k, components + k, least));
+    }
     for (size_t k = 0; k < field->bricks.count * SAMPLES; ++k)
         field->largest = fmax(field->largest, field->values[k]);
 cleanup:

@@ -1,3 +1,4 @@
+#include "base/progress.h"
 #include "molecule/cif.h"
 #include "molecule/radii.h"
 #include "molecule/reader.h"
@@ -456,15 +457,16 @@ static ovoid_status complete_options(ovoid_context *context, const ovoid_read_op
 
 ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
                                       const ovoid_read_options *given, ovoid_molecule **molecule) {
-    if (!path || !molecule)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_read: %s is NULL",
-                       path ? "molecule" : "path");
+    OV_NEED(context, context);
+    OV_NEED(context, path);
+    OV_NEED(context, molecule);
     ovoid_read_options options;
     ovoid_status status = complete_options(context, given, &options);
     if (status != OVOID_OK)
         return status;
     ov_reader reader = {
         .context = context, .guess = options.format == OVOID_MOLECULE_AUTO, .options = &options};
+    ov_progress_begin(context, "read");
     ov_sites_init(&reader.sites);
     status = OVOID_ERROR_MEMORY;
     reader.molecule = ov_alloc(context, 1, sizeof *reader.molecule, "a molecule");
@@ -473,6 +475,7 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
     OV_TRY(ov_selection_check(context, options.select));
     OV_TRY(ov_text_open(context, path, &reader.text));
     OV_TRY(read_text(&reader, reader.guess ? format_by_name(path) : options.format));
+    OV_TRY(ov_progress_ask(context));
     trim(reader.molecule);
     count_zero_radii(reader.molecule);
     OV_TRY(ov_molecule_doubts(context, ov_text_name(reader.text), reader.molecule));
@@ -486,12 +489,16 @@ cleanup:
     ov_assembly_source_destroy(&reader.assemblies);
     ov_text_close(&reader.text);
     ovoid_molecule_destroy(&reader.molecule);
+    ov_progress_end(context);
     return status;
 }
 
 ovoid_status ovoid_molecule_read(ovoid_context *context, const char *path,
                                  ovoid_molecule_format format, ovoid_molecule **molecule) {
     ovoid_read_options options;
+    OV_NEED(context, context);
+    OV_NEED(context, path);
+    OV_NEED(context, molecule);
     ovoid_read_options_init(&options, sizeof options);
     options.format = format;
     return ovoid_molecule_read_with(context, path, &options, molecule);
@@ -501,9 +508,10 @@ ovoid_status ovoid_molecule_read(ovoid_context *context, const char *path,
 
 ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, size_t atoms,
                                    ovoid_molecule **molecule) {
-    if (!molecule || (!xyzr && atoms))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_create: %s is NULL",
-                       molecule ? "xyzr" : "molecule");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    if (atoms)
+        OV_NEED(context, xyzr);
     if (atoms == 0)
         return ov_fail(context, OVOID_ERROR_EMPTY, "ovoid_molecule_create: no atoms");
     for (size_t i = 0; i < atoms; i++) {
@@ -567,9 +575,9 @@ const double *ovoid_molecule_xyzr(const ovoid_molecule *molecule) {
 }
 
 ovoid_status ovoid_molecule_expand(ovoid_context *context, const ovoid_molecule *molecule) {
-    return molecule
-               ? ov_molecule_expand(context, molecule)
-               : ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_expand: molecule is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    return ov_molecule_expand(context, molecule);
 }
 
 size_t ovoid_molecule_unit_atoms(const ovoid_molecule *molecule) {
@@ -604,7 +612,7 @@ size_t ovoid_molecule_origin(const ovoid_molecule *molecule, size_t atom, size_t
     if (placement)
         *placement = 0;
     if (!molecule || molecule->placement_count == 0)
-        return atom;
+        return molecule ? atom : 0;
     size_t low = 0, high = molecule->placement_count; /* the last that begins at `atom` or before */
     while (high - low > 1) {
         const size_t middle = low + (high - low) / 2;
@@ -630,11 +638,11 @@ ovoid_molecule_format ovoid_molecule_read_format(const ovoid_molecule *molecule)
 }
 
 ovoid_radii ovoid_molecule_radii(const ovoid_molecule *molecule) {
-    return molecule ? molecule->radii : OVOID_RADII_OWN;
+    return molecule ? molecule->radii : OVOID_RADII_DEFAULT;
 }
 
 int32_t ovoid_molecule_model(const ovoid_molecule *molecule) {
-    return molecule ? molecule->model : 1;
+    return molecule ? molecule->model : 0;
 }
 
 const ovoid_atom *ovoid_molecule_identity(const ovoid_molecule *molecule) {

@@ -1,10 +1,13 @@
 #include "molecule/text.h"
 
+#include "base/progress.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -29,6 +32,7 @@ struct ov_text {
     bool done;
     bool drop_lf; /* the last line ended in CR: an LF that follows belongs to it */
     uint64_t lines;
+    uint64_t read, bytes; /* of the file; bytes 0: not known */
 };
 
 const char *ov_text_name(const ov_text *text) {
@@ -56,13 +60,17 @@ static ovoid_status read_raw(ov_text *text) {
     text->raw_end -= text->raw_at;
     text->raw_at = 0;
     ssize_t got;
-    do
-        got = read(text->file, text->raw + text->raw_end, RAW_ROOM - text->raw_end);
-    while (got < 0 && errno == EINTR);
+    while ((got = read(text->file, text->raw + text->raw_end, RAW_ROOM - text->raw_end)) < 0 &&
+           errno == EINTR) {
+        const ovoid_status asked = ov_progress_ask(text->context);
+        if (asked != OVOID_OK)
+            return asked;
+    }
     if (got < 0)
         return ov_fail(text->context, OVOID_ERROR_IO, "%s: cannot read: %s", text->name,
                        strerror(errno));
     text->raw_end += (size_t)got;
+    text->read += (uint64_t)got;
     text->raw_done = got == 0;
     return OVOID_OK;
 }
@@ -146,6 +154,9 @@ static ovoid_status copy_some(ov_text *text) {
 
 /* Makes room and adds text, at least one byte unless it is done. */
 static ovoid_status fill(ov_text *text) {
+    const ovoid_status asked = ov_progress_step(text->context, text->read, text->bytes);
+    if (asked != OVOID_OK)
+        return asked;
     memmove(text->data, text->data + text->at, text->end - text->at);
     text->end -= text->at;
     text->at = 0;
@@ -219,6 +230,9 @@ ovoid_status ov_text_open(ovoid_context *context, const char *path, ov_text **te
             ov_fail(context, OVOID_ERROR_IO, "%s: cannot open: %s", made->name, strerror(errno));
         goto cleanup;
     }
+    struct stat info;
+    if (fstat(made->file, &info) == 0 && S_ISREG(info.st_mode))
+        made->bytes = (uint64_t)info.st_size;
     OV_TRY(recognise_compression(made));
     OV_TRY(recognise_encoding(made));
     *text = made;

@@ -165,8 +165,10 @@ ovoid_status ov_facets_create(ovoid_context *context, const ov_trail *trail, con
     if (!boxes)
         return OVOID_ERROR_MEMORY;
     memcpy(made.origin, origin, sizeof made.origin);
-    for (size_t leaf = 0; leaf < leaves; ++leaf)
+    for (size_t leaf = 0; leaf < leaves; ++leaf) {
+        OV_TRY(ov_progress_turn(context, leaf, leaves));
         box_leaf(&made, leaf, boxes + leaf * BOX);
+    }
     OV_TRY(ov_tree_build(context, boxes, leaves, &made.tree, &tree, &floats));
     OV_TRY(ov_buffer_put(context, &made.boxes, tree, floats * sizeof *tree, "boxes of triangles"));
     *facets = made;
@@ -264,7 +266,10 @@ static ovoid_status measure_leaves(ovoid_context *context, measuring *m, bool co
     OV_TRY(load_leaves(context, m->facets, coarse, m->first, m->end, m->use_bound ? m->box : NULL));
     for (size_t k = 0, size; k < count; k += size) {
         const float *xyz;
-        OV_TRY(ov_watch_ask(context, m->facets->watch, "measuring distances"));
+        if (m->facets->watch)
+            OV_TRY(ov_watch_ask(context, m->facets->watch));
+        else
+            OV_TRY(ov_progress_step(context, k, count));
         size = count - k < batch ? count - k : batch;
         find_sites(m, k, size, &xyz);
         if (!m->use_bound || !out_of_reach(m, xyz, size, squared + k))
@@ -415,6 +420,9 @@ static ovoid_status sum_distances(ovoid_context *context, const ov_trail *from,
     directed sum = {0.0, 0.0, 0.0};
     double weights = 0.0;
     for (size_t k = 0; k < from->triangles; ++k) {
+        const ovoid_status asked = ov_progress_turn(context, k, from->triangles);
+        if (asked != OVOID_OK)
+            return asked;
         const uint32_t t = ov_trail_triangle(from, k);
         const double area = area_of(from->mesh, t), weight[2] = {area / 12.0, 0.75 * area};
         for (size_t i = 0; i < 4; ++i) {
@@ -519,15 +527,19 @@ cleanup:
 ovoid_status ovoid_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
                                   bool outer_only, ovoid_distances *distances, float *from_a) {
     float *of_vertices = NULL;
-    if (!a || !b || !distances)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "distances are of two meshes");
+    OV_NEED(context, context);
+    OV_NEED(context, a);
+    OV_NEED(context, b);
+    OV_NEED(context, distances);
     if (from_a) {
         of_vertices = ov_alloc(context, a->vertices, sizeof *of_vertices, "distances");
         if (!of_vertices)
             return OVOID_ERROR_MEMORY;
     }
+    ov_progress_begin(context, "measure");
     const ovoid_status status =
         ov_mesh_distances(context, a, b, outer_only, distances, of_vertices, NULL);
+    ov_progress_end(context);
     if (from_a && status == OVOID_OK)
         memcpy(from_a, of_vertices, a->vertices * sizeof *from_a);
     free(of_vertices);

@@ -24,7 +24,7 @@ typedef struct ov_facets {
     const ov_trail *trail; /* borrowed */
     double origin[3];      /* angstrom, subtracted before rounding to float */
     size_t chunk, batch;   /* as above, or less in tests */
-    const ov_watch *watch; /* asked before each batch; may be NULL */
+    const ov_watch *watch; /* asked before each batch; NULL: the context */
     double enough; /* angstrom: a distance of at most this may be told as more, up to this */
     ov_tree tree;
     ov_buffer boxes;  /* device: the tree's boxes */
@@ -51,7 +51,7 @@ ovoid_status ov_facets_distances(ovoid_context *context, ov_facets *facets, cons
                                  float *squared);
 
 /* distance[v] of each vertex of `from` that is in a triangle to the surface `to`; 0 for others.
- * enough: as in ov_facets; watch may be NULL. */
+ * enough and watch: as in ov_facets. */
 ovoid_status ov_vertex_distances(ovoid_context *context, const ovoid_mesh *from,
                                  const ovoid_mesh *to, const double origin[3], double enough,
                                  const ov_watch *watch, float *distance);

@@ -26,8 +26,9 @@ ovoid_status ov_image_make(ovoid_context *context, uint32_t width, uint32_t heig
 
 ovoid_status ovoid_image_create(ovoid_context *context, uint32_t width, uint32_t height,
                                 const uint8_t *pixels, ovoid_image **image) {
-    if (!pixels || !image)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_image_create: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, pixels);
+    OV_NEED(context, image);
     if (!size_fits(width, height))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "an image has 1 to %d pixels on a side, not %u by %u",
@@ -63,7 +64,7 @@ uint64_t ovoid_image_covered(const ovoid_image *image) {
 }
 
 double ovoid_image_range(const ovoid_image *image) {
-    return image ? image->range : 0.0;
+    return image ? image->range : NAN;
 }
 
 /* ---- drawing ------------------------------------------------------------------------------ */

@@ -554,7 +554,11 @@ static ovoid_status fail_empty(ovoid_context *context, const marcher *m) {
 static ovoid_status march_pieces(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     for (size_t piece = m->pieces.pieces; piece-- > 0;) {
-        OV_TRY(ov_watch_ask(context, m->watch, "meshing"));
+        const size_t pieces = m->pieces.pieces;
+        if (m->watch)
+            OV_TRY(ov_watch_ask(context, m->watch));
+        else
+            OV_TRY(ov_progress_step(context, pieces - 1 - piece, pieces));
         drop_old_faces(m, piece);
         OV_TRY(evaluate(context, m, piece));
         OV_TRY(fill_ghosts(context, m));

@@ -26,8 +26,8 @@ ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t coun
                       const ovoid_mesh_options *options, const uint64_t limit[3],
                       ovoid_mesh **mesh);
 
-/* As ov_march(), a light mesh (see mesh.h) about this origin. The watch, which may be NULL, is
- * asked before each piece. */
+/* As ov_march(), a light mesh (see mesh.h) about this origin. The watch is asked
+ * before each piece; where it is NULL, the context. */
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
                             const double origin[3], const ov_watch *watch, ovoid_mesh **mesh);

@@ -6,6 +6,8 @@
 #include <string.h>
 
 void ovoid_measure_options_init(ovoid_measure_options *options) {
+    if (!options)
+        return;
     *options = (ovoid_measure_options){.isovalue = OVOID_DEFAULT_ISOVALUE,
                                        .spacing = OVOID_DEFAULT_MESH_SPACING,
                                        .vertices = OVOID_VERTEX_EXACT,
@@ -24,16 +26,17 @@ static uint64_t count_outer(const ovoid_mesh *mesh) {
     return count;
 }
 
-static ov_content content_of(const ovoid_mesh *mesh, bool smooth, bool outer_only) {
-    return smooth ? ov_mesh_smooth(mesh, outer_only) : ov_mesh_flat(mesh, outer_only);
-}
-
-static void compare_contents(const ovoid_mesh *original, const ovoid_mesh *sparse, bool smooth,
-                             bool outer_only, ovoid_pair *area, ovoid_pair *volume) {
-    const ov_content first = content_of(original, smooth, outer_only);
-    const ov_content second = content_of(sparse, smooth, outer_only);
+static ovoid_status compare_contents(ovoid_context *context, const ovoid_mesh *original,
+                                     const ovoid_mesh *sparse, bool smooth, bool outer_only,
+                                     ovoid_pair *area, ovoid_pair *volume) {
+    ovoid_status status = OVOID_OK;
+    ov_content first, second;
+    OV_TRY(ov_mesh_content(context, original, smooth, outer_only, &first));
+    OV_TRY(ov_mesh_content(context, sparse, smooth, outer_only, &second));
     *area = pair_of(first.area, second.area);
     *volume = pair_of(first.volume, second.volume);
+cleanup:
+    return status;
 }
 
 static double largest_of_outer(const ovoid_mesh *mesh, const float *distance) {
@@ -72,8 +75,9 @@ ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *origina
                            .components_sparse = sparse->components,
                            .outer_original = count_outer(original),
                            .outer_sparse = count_outer(sparse)};
-    compare_contents(original, sparse, smooth, false, &made.area, &made.volume);
-    compare_contents(original, sparse, smooth, true, &made.area_outer, &made.volume_outer);
+    OV_TRY(compare_contents(context, original, sparse, smooth, false, &made.area, &made.volume));
+    OV_TRY(compare_contents(context, original, sparse, smooth, true, &made.area_outer,
+                            &made.volume_outer));
     if (distances) {
         OV_TRY(compare_vertices(context, original, sparse, &made));
         made.distances_outer = made.distances;
@@ -89,7 +93,8 @@ cleanup:
 
 /* Says which of the two surfaces failed. */
 static ovoid_status name_failure(ovoid_context *context, ovoid_status status, const char *which) {
-    char *const text = status == OVOID_OK ? NULL : strdup(ovoid_context_error(context));
+    const bool named = status != OVOID_OK && status != OVOID_ERROR_CANCELLED;
+    char *const text = !named ? NULL : strdup(ovoid_context_error(context));
     if (text)
         ov_fail(context, status, "the surface of the %s: %s", which, text);
     free(text);
@@ -102,9 +107,12 @@ ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecul
     ovoid_status status = OVOID_OK;
     ovoid_mesh *original = NULL, *sparse = NULL;
     ovoid_measures made;
-    if (!molecule || !model || !options || !measures)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "measuring takes a molecule, a model and options");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, model);
+    OV_NEED(context, options);
+    OV_NEED(context, measures);
+    ov_progress_begin(context, "mesh");
     const double begin = ov_seconds();
     const ovoid_mesh_options meshing = {options->isovalue, options->spacing, options->vertices};
     status = ovoid_molecule_mesh(context, molecule, ovoid_model_decay(model), &meshing, &original);
@@ -112,6 +120,7 @@ ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecul
     status = ovoid_model_mesh(context, model, &meshing, &sparse);
     OV_TRY(name_failure(context, status, "model"));
     const double meshed = ov_seconds();
+    ov_progress_stage(context, "measure");
     OV_TRY(ov_measure_meshes(context, original, sparse, options->vertices == OVOID_VERTEX_EXACT,
                              options->distances, &made));
     made.seconds_mesh = meshed - begin;
@@ -119,5 +128,6 @@ ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecul
 cleanup:
     ovoid_mesh_destroy(&original);
     ovoid_mesh_destroy(&sparse);
+    ov_progress_end(context);
     return status;
 }

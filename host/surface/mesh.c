@@ -185,6 +185,8 @@ static ovoid_status check_edges(ovoid_context *context, ovoid_mesh *mesh) {
             (int32_t)(mesh->component[c].vertices + mesh->component[c].triangles);
     }
     for (size_t first = 0, end; first < mesh->vertices; first = end) {
+        if ((status = ov_progress_ask(context)) != OVOID_OK)
+            goto cleanup;
         end = edges_end(mesh, count, first, most);
         check_edges_of(mesh, first, end, count, edges);
     }
@@ -293,9 +295,12 @@ static ovoid_status finish_mesh(ovoid_context *context, const ovoid_mesh *arrays
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(find_components(context, made));
+    OV_TRY(ov_progress_ask(context));
     if (made->xyz)
         OV_TRY(check_edges(context, made));
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(measure_components(context, made));
     *mesh = made;
     made = NULL;
@@ -336,8 +341,12 @@ static void *copy_of(ovoid_context *context, const void *data, size_t count, siz
 ovoid_status ovoid_mesh_create(ovoid_context *context, const double *xyz, const float *normals,
                                size_t vertices, const uint32_t *corners, size_t triangles,
                                ovoid_mesh **mesh) {
-    if (!mesh || (!xyz && vertices > 0) || (!corners && triangles > 0))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "a mesh needs its arrays");
+    OV_NEED(context, context);
+    OV_NEED(context, mesh);
+    if (vertices > 0)
+        OV_NEED(context, xyz);
+    if (triangles > 0)
+        OV_NEED(context, corners);
     if (vertices > SIZE_MAX / 3 || triangles > SIZE_MAX / 3)
         return ov_fail(context, OVOID_ERROR_LIMIT, "a mesh of %zu vertices and %zu triangles",
                        vertices, triangles);
@@ -351,7 +360,11 @@ ovoid_status ovoid_mesh_create(ovoid_context *context, const double *xyz, const 
         free(directions);
         return OVOID_ERROR_MEMORY;
     }
-    return ov_mesh_adopt(context, points, directions, vertices, triples, triangles, mesh);
+    ov_progress_begin(context, "mesh");
+    const ovoid_status status =
+        ov_mesh_adopt(context, points, directions, vertices, triples, triangles, mesh);
+    ov_progress_end(context);
+    return status;
 }
 
 void ovoid_mesh_destroy(ovoid_mesh **mesh) {
@@ -371,35 +384,35 @@ void ovoid_mesh_destroy(ovoid_mesh **mesh) {
 /* ---- accessors ---------------------------------------------------------------------------- */
 
 size_t ovoid_mesh_vertices(const ovoid_mesh *mesh) {
-    return mesh->vertices;
+    return mesh ? mesh->vertices : 0;
 }
 
 size_t ovoid_mesh_triangles(const ovoid_mesh *mesh) {
-    return mesh->triangles;
+    return mesh ? mesh->triangles : 0;
 }
 
 const double *ovoid_mesh_xyz(const ovoid_mesh *mesh) {
-    return mesh->xyz;
+    return mesh ? mesh->xyz : NULL;
 }
 
 const float *ovoid_mesh_normals(const ovoid_mesh *mesh) {
-    return mesh->normals;
+    return mesh ? mesh->normals : NULL;
 }
 
 const uint32_t *ovoid_mesh_corners(const ovoid_mesh *mesh) {
-    return mesh->corners;
+    return mesh ? mesh->corners : NULL;
 }
 
 const uint32_t *ovoid_mesh_component_of(const ovoid_mesh *mesh) {
-    return mesh->component_of;
+    return mesh ? mesh->component_of : NULL;
 }
 
 size_t ovoid_mesh_components(const ovoid_mesh *mesh) {
-    return mesh->components;
+    return mesh ? mesh->components : 0;
 }
 
 const ovoid_component *ovoid_mesh_component(const ovoid_mesh *mesh, size_t index) {
-    return index < mesh->components ? &mesh->component[index] : NULL;
+    return mesh && index < mesh->components ? &mesh->component[index] : NULL;
 }
 
 /* ---- area and volume ---------------------------------------------------------------------- */
@@ -500,33 +513,44 @@ static void integrate_bent(const bent_triangle *t, ov_content *content) {
     }
 }
 
-ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only) {
+ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
+                             bool outer_only, ov_content *result) {
+    ovoid_status status = OVOID_OK;
     ov_content content = {0.0, 0.0};
     double origin[3] = {0.0, 0.0, 0.0};
     if (mesh->vertices > 0)
         ov_mesh_at(mesh, 0, origin);
-    for (size_t t = 0; t < mesh->triangles; ++t) {
+    for (size_t t = 0; smooth && t < mesh->triangles; ++t) {
+        OV_TRY(ov_progress_turn(context, t, mesh->triangles));
         if (outer_only && !ov_mesh_component_of_triangle(mesh, t)->outer)
             continue;
         bent_triangle bent;
         bend(mesh, t, origin, &bent);
         integrate_bent(&bent, &content);
     }
+    *result = smooth ? content : ov_mesh_flat(mesh, outer_only);
+cleanup:
+    return status;
+}
+
+ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only) {
+    ov_content content = {0.0, 0.0};
+    (void)ov_mesh_content(NULL, mesh, true, outer_only, &content); /* nobody stops it */
     return content;
 }
 
 double ovoid_mesh_area(const ovoid_mesh *mesh) {
-    return ov_mesh_flat(mesh, false).area;
+    return mesh ? ov_mesh_flat(mesh, false).area : NAN;
 }
 
 double ovoid_mesh_volume(const ovoid_mesh *mesh) {
-    return ov_mesh_flat(mesh, false).volume;
+    return mesh ? ov_mesh_flat(mesh, false).volume : NAN;
 }
 
 double ovoid_mesh_smooth_area(const ovoid_mesh *mesh) {
-    return ov_mesh_smooth(mesh, false).area;
+    return mesh ? ov_mesh_smooth(mesh, false).area : NAN;
 }
 
 double ovoid_mesh_smooth_volume(const ovoid_mesh *mesh) {
-    return ov_mesh_smooth(mesh, false).volume;
+    return mesh ? ov_mesh_smooth(mesh, false).volume : NAN;
 }

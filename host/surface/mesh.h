@@ -5,6 +5,7 @@
 #define OV_MESH_H
 
 #include "base/base.h"
+#include "base/progress.h"
 #include "ovoid/surface.h"
 
 /* A light mesh, which the library keeps for itself, has offsets instead of xyz, knows nothing of
@@ -29,20 +30,6 @@ struct ovoid_mesh {
 
 #define OV_EDGE_AXIS_BITS 2
 #define OV_EDGE_AXES 3u /* mask */
-
-/* Asked between the parts of something long; false stops it with OVOID_ERROR_CANCELLED. {0} lets it
- * go on. */
-typedef struct ov_watch {
-    bool (*go_on)(void *user);
-    void *user;
-} ov_watch;
-
-static inline ovoid_status ov_watch_ask(ovoid_context *context, const ov_watch *watch,
-                                        const char *what) {
-    if (!watch || !watch->go_on || watch->go_on(watch->user))
-        return OVOID_OK;
-    return ov_fail(context, OVOID_ERROR_CANCELLED, "stopped while %s", what);
-}
 
 static inline void ov_mesh_at(const ovoid_mesh *mesh, size_t vertex, double at[3]) {
     for (size_t k = 0; k < 3; ++k)
@@ -85,5 +72,9 @@ typedef struct ov_content {
 } ov_content;
 ov_content ov_mesh_flat(const ovoid_mesh *mesh, bool outer_only);
 ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only);
+
+/* Either of them, asking on the way whether to go on. */
+ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
+                             bool outer_only, ov_content *result);
 
 #endif

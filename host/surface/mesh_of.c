@@ -37,23 +37,27 @@ ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *m
                                  ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     ov_body *bodies = NULL;
-    if (!context || !molecule || !options || !mesh)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_mesh: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, options);
+    OV_NEED(context, mesh);
     if (!(decay > 0.0 && decay <= 100.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
                        decay);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
+    ov_progress_begin(context, "mesh");
     OV_TRY(check_options(context, options));
     OV_TRY(ov_atoms_check(context, xyzr, atoms, decay));
     bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
     if (!bodies)
-        return OVOID_ERROR_MEMORY;
+        OV_TRY(OVOID_ERROR_MEMORY);
     for (size_t i = 0; i < atoms; ++i)
         ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
     OV_TRY(ov_mesh_bodies(context, bodies, atoms, options, mesh));
 cleanup:
     free(bodies);
+    ov_progress_end(context);
     return status;
 }
 
@@ -78,12 +82,15 @@ ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
                               const ovoid_mesh_options *options, ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     ov_body *bodies = NULL;
-    if (!context || !model || !options || !mesh)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_mesh: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    OV_NEED(context, options);
+    OV_NEED(context, mesh);
+    ov_progress_begin(context, "mesh");
     OV_TRY(check_options(context, options));
     bodies = ov_alloc(context, model->count, sizeof *bodies, "ellipsoids");
     if (!bodies)
-        return OVOID_ERROR_MEMORY;
+        OV_TRY(OVOID_ERROR_MEMORY);
     for (size_t i = 0; i < model->count; ++i)
         ov_body_of_ellipsoid(&model->ellipsoids[i], &bodies[i]);
     if (model->count > 0)
@@ -92,5 +99,6 @@ ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
     OV_TRY(ov_mesh_bodies(context, bodies, model->count, options, mesh));
 cleanup:
     free(bodies);
+    ov_progress_end(context);
     return status;
 }

@@ -1,5 +1,6 @@
 #include "surface/render.h"
 
+#include "base/progress.h"
 #include "fit/model.h"
 #include "surface/colour_bar.h"
 #include "surface/image.h"
@@ -98,9 +99,11 @@ static ovoid_status check(ovoid_context *context, const ovoid_molecule *molecule
     if ((unsigned)options->view > OVOID_VIEW_PANEL)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "there is no view %d", (int)options->view);
     if (needs_molecule(options->view) && !molecule)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "this view needs a molecule");
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "ovoid_render: molecule is NULL: this view needs a molecule");
     if (needs_model(options->view) && !model)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "this view needs a model");
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "ovoid_render: model is NULL: this view needs a model");
     const uint32_t least = options->view == OVOID_VIEW_PANEL ? PANEL : 1;
     if (options->width < least || options->height < 1 || options->width > OVOID_PICTURE_SIDE_MAX ||
         options->height > OVOID_PICTURE_SIDE_MAX)
@@ -517,13 +520,15 @@ static void destroy_painter(painter *p) {
 ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule, double decay,
                           const ovoid_model *model, const ovoid_picture_options *options,
                           ovoid_image **image) {
-    if (!context || !options || !image)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_render: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, options);
+    OV_NEED(context, image);
     ovoid_status status = check(context, molecule, decay, model, options);
     if (status != OVOID_OK)
         return status;
     painter p = {.context = context, .options = options};
     ovoid_image *made = NULL;
+    ov_progress_begin(context, "render");
     const bool panel = options->view == OVOID_VIEW_PANEL;
     ov_palette_diverging(p.diverging);
     ov_palette_distinct(p.distinct);
@@ -542,5 +547,6 @@ ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule
 cleanup:
     ovoid_image_destroy(&made);
     destroy_painter(&p);
+    ov_progress_end(context);
     return status;
 }

@@ -1,5 +1,7 @@
 #include "surface/trail.h"
 
+#include "base/progress.h"
+
 #include "field/field.h"
 
 #include <float.h>
@@ -74,6 +76,7 @@ static ovoid_status sort_triangles(ovoid_context *context, ov_trail *trail) {
         goto cleanup;
     }
     find_keys(trail, keys);
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_sort_keys(context, keys, count, order));
     for (size_t k = 0; k < count; ++k)
         order[k] = trail->triangle[order[k]];
@@ -128,6 +131,7 @@ ovoid_status ov_trail_create(ovoid_context *context, const ovoid_mesh *mesh, boo
     list_triangles(&made, outer_only);
     if (!mesh->along_curve)
         OV_TRY(sort_triangles(context, &made));
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(list_vertices(context, &made));
     *trail = made;
 cleanup:

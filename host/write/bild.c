@@ -3,7 +3,11 @@
  * follow it, so the last comes first. */
 #include "write/export.h"
 
-void ov_write_bild(const ovoid_model *model, const ov_drawing *drawing, FILE *stream) {
+#include "base/progress.h"
+
+ovoid_status ov_write_bild(ovoid_context *context, const ovoid_model *model,
+                           const ov_drawing *drawing, FILE *stream) {
+    ovoid_status status = OVOID_OK;
     const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
     fprintf(stream,
             ".comment Ovoid %s, lengths in angstrom, ellipsoids at isovalue %.9g\n"
@@ -12,6 +16,7 @@ void ov_write_bild(const ovoid_model *model, const ov_drawing *drawing, FILE *st
             ovoid_version(), drawing->isovalue, drawing->colour[0], drawing->colour[1],
             drawing->colour[2], 1.0 - drawing->opacity);
     for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, ovoid_model_size(model)));
         ov_solid s;
         double vector[3], angle;
         ov_solid_of_ellipsoid(&ellipsoids[i], drawing->isovalue, &s);
@@ -26,4 +31,6 @@ void ov_write_bild(const ovoid_model *model, const ov_drawing *drawing, FILE *st
                 i + 1, ellipsoids[i].amplitude, s.centre[0], s.centre[1], s.centre[2], angle,
                 vector[0], vector[1], vector[2], s.semi[0], s.semi[1], s.semi[2]);
     }
+cleanup:
+    return status;
 }

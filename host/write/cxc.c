@@ -2,18 +2,23 @@
  * of its own. The rotation is an axis and an angle in degrees. */
 #include "write/export.h"
 
+#include "base/progress.h"
+
 #include <math.h>
 
 static unsigned byte_of(double part) {
     return (unsigned)lround(255.0 * part);
 }
 
-void ov_write_cxc(const ovoid_model *model, const ov_drawing *drawing, FILE *stream) {
+ovoid_status ov_write_cxc(ovoid_context *context, const ovoid_model *model,
+                          const ov_drawing *drawing, FILE *stream) {
+    ovoid_status status = OVOID_OK;
     const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
     const double *colour = drawing->colour;
     fprintf(stream, "# Ovoid %s, lengths in angstrom, ellipsoids at isovalue %.9g\n",
             ovoid_version(), drawing->isovalue);
     for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, ovoid_model_size(model)));
         ov_solid s;
         double vector[3], angle;
         ov_solid_of_ellipsoid(&ellipsoids[i], drawing->isovalue, &s);
@@ -25,4 +30,6 @@ void ov_write_cxc(const ovoid_model *model, const ov_drawing *drawing, FILE *str
                 vector[1], vector[2], angle, byte_of(colour[0]), byte_of(colour[1]),
                 byte_of(colour[2]), byte_of(drawing->opacity), drawing->title, i + 1);
     }
+cleanup:
+    return status;
 }

@@ -1,6 +1,7 @@
 #include "write/export.h"
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "field/field.h"
 #include "write/text.h"
 
@@ -12,7 +13,8 @@
 typedef struct format {
     const char *name;
     const char *extensions;
-    void (*ellipsoids)(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+    ovoid_status (*ellipsoids)(ovoid_context *context, const ovoid_model *model,
+                               const ov_drawing *drawing, FILE *stream);
     ovoid_status (*map)(ovoid_context *context, const ov_map *map, FILE *stream);
     int bytes; /* of a map's value */
 } format;
@@ -49,6 +51,8 @@ ovoid_export_format ovoid_export_format_find(const char *name) {
 }
 
 void ovoid_export_options_init(ovoid_export_options *options) {
+    if (!options)
+        return;
     *options = (ovoid_export_options){.spacing = OVOID_DEFAULT_MESH_SPACING,
                                       .colour = {0.30, 0.55, 0.80},
                                       .opacity = 1.0,
@@ -64,7 +68,8 @@ static ovoid_status check_options(ovoid_context *context, const ovoid_export_opt
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "%d is no format of an export",
                        (int)o->format);
     if (!(o->isovalue >= 0.0 && isfinite(o->isovalue)))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue %g is not positive", o->isovalue);
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "isovalue must be finite and not negative; it is %g", o->isovalue);
     if (!(o->spacing > 0.0 && o->spacing <= 1000.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "spacing %g is not above 0 and at most 1000 angstrom", o->spacing);
@@ -114,18 +119,20 @@ static ovoid_status write_file(ovoid_context *context, const char *path, const f
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
+    ov_progress_begin(context, chosen->map ? "map" : "write");
     OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
     if (chosen->map)
         OV_TRY(chosen->map(context, map, output.stream));
     else
-        chosen->ellipsoids(model, drawing, output.stream);
+        OV_TRY(chosen->ellipsoids(context, model, drawing, output.stream));
     OV_TRY(ov_stream_check(context, output.stream, path));
     status = ov_output_commit(context, &output);
 
 cleanup:
     ov_output_abandon(&output);
     ov_locale_leave(&locale);
+    ov_progress_end(context);
     return status;
 }
 
@@ -145,11 +152,7 @@ static ovoid_status check_size(ovoid_context *context, const ov_map *map, int by
 static ovoid_status write_map(ovoid_context *context, const char *path, const format *chosen,
                               const ovoid_export_options *options, double isovalue,
                               const ov_quadric *quadrics, size_t count, const char *label) {
-    ov_map map = {.quadrics = quadrics,
-                  .count = count,
-                  .spacing = options->spacing,
-                  .progress = options->progress,
-                  .user = options->user};
+    ov_map map = {.quadrics = quadrics, .count = count, .spacing = options->spacing};
     snprintf(map.label, sizeof map.label, "%s", label);
     ovoid_status status = ov_map_cover(context, &map, isovalue);
     if (status == OVOID_OK)
@@ -177,8 +180,9 @@ static ovoid_status export_model_map(ovoid_context *context, const ovoid_model *
 
 ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model, const char *path,
                                 const ovoid_export_options *options) {
-    if (!context || !model || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_export: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    OV_NEED(context, path);
     ovoid_export_options o;
     const format *chosen;
     ovoid_export_options_init(&o);
@@ -201,8 +205,9 @@ ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model
 ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
                                    double decay, const char *path,
                                    const ovoid_export_options *options) {
-    if (!context || !molecule || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_export: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, path);
     if (!(decay > 0.0 && decay <= 100.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
                        decay);

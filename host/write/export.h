@@ -2,7 +2,7 @@
  * Models and fields for other programs: what the formats share, and one writer each.
  *
  * Writers of text expect the "C" locale. A failed write shows in the stream's error flag; they stop
- * at it.
+ * at it, and where the context's progress callback says so.
  */
 #ifndef OV_EXPORT_H
 #define OV_EXPORT_H
@@ -38,11 +38,16 @@ void ov_solid_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, double isovalue, ov
  * (degrees, 0 to 180). */
 void ov_solid_rotation(const ov_solid *solid, double vector[3], double *angle);
 
-void ov_write_bild(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
-void ov_write_cxc(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
-void ov_write_pymol(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
-void ov_write_gmm(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
-void ov_write_json(const ovoid_model *model, const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_bild(ovoid_context *context, const ovoid_model *model,
+                           const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_cxc(ovoid_context *context, const ovoid_model *model,
+                          const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_pymol(ovoid_context *context, const ovoid_model *model,
+                            const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_gmm(ovoid_context *context, const ovoid_model *model,
+                          const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_json(ovoid_context *context, const ovoid_model *model,
+                           const ov_drawing *drawing, FILE *stream);
 
 /* ---- maps --------------------------------------------------------------------------------- */
 
@@ -54,8 +59,6 @@ typedef struct ov_map {
     int32_t start[3]; /* x, y, z */
     int32_t size[3];
     char label[80]; /* what field it is */
-    ovoid_export_progress_fn progress;
-    void *user;
 } ov_map;
 
 /* Sets the lattice: it covers the region where a Gaussian is at least isovalue / 100.
@@ -68,7 +71,7 @@ uint64_t ov_map_points(const ov_map *map);
 typedef void (*ov_map_sink)(const float *values, size_t count, void *user);
 
 /* Computes the field piece by piece, fast[0] the axis that runs fastest, fast[2] slowest, until all
- * is done, a write to `stream` fails, or the map's progress function says stop. */
+ * is done, a write to `stream` fails, or the context's progress callback says stop. */
 ovoid_status ov_map_run(ovoid_context *context, const ov_map *map, const int fast[3], FILE *stream,
                         ov_map_sink sink, void *user);
 

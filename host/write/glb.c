@@ -7,6 +7,7 @@
  *
  * Positions are floats. Far from the origin, where these are coarse, they are relative to the
  * middle of the mesh, and the node moves them there. */
+#include "base/progress.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -83,19 +84,28 @@ static void put_normal(ov_bytes *bytes, const float *normal) {
         ov_put_f32(bytes, usable ? (float)(n[axis] / length) : axis == 2 ? 1.0f : 0.0f);
 }
 
-static void put_buffer(ov_bytes *bytes, const ovoid_mesh *mesh, const layout *l) {
+static ovoid_status put_buffer(ovoid_context *context, ov_bytes *bytes, const ovoid_mesh *mesh,
+                               const layout *l) {
+    ovoid_status status = OVOID_OK;
     const float *normals = ovoid_mesh_normals(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
     for (size_t i = 0; i < l->vertices; i++) {
         float at[3];
+        OV_TRY(ov_progress_turn(context, i, l->vertices));
         ov_mesh_float_at(mesh, i, l->origin, at);
         for (size_t axis = 0; axis < 3; axis++)
             ov_put_f32(bytes, at[axis]);
     }
-    for (size_t i = 0; i < l->vertices; i++)
+    for (size_t i = 0; i < l->vertices; i++) {
+        OV_TRY(ov_progress_turn(context, i, l->vertices));
         put_normal(bytes, normals + 3 * i);
-    for (size_t i = 0; i < 3 * l->triangles; i++)
+    }
+    for (size_t i = 0; i < 3 * l->triangles; i++) {
+        OV_TRY(ov_progress_turn(context, i, 3 * l->triangles));
         ov_put_u32(bytes, corners[i]);
+    }
+cleanup:
+    return status;
 }
 
 ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream) {
@@ -123,7 +133,7 @@ ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     ov_put_text(&bytes, json, json_length);
     ov_put_u32(&bytes, (uint32_t)buffer);
     ov_put_text(&bytes, "BIN\0", 4);
-    put_buffer(&bytes, mesh, &l);
+    const ovoid_status status = put_buffer(context, &bytes, mesh, &l);
     ov_bytes_flush(&bytes);
-    return OVOID_OK;
+    return status;
 }

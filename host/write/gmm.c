@@ -10,6 +10,8 @@
  * tells them apart by a change of the number. So numbers begin again after 999. */
 #include "write/export.h"
 
+#include "base/progress.h"
+
 #include <math.h>
 
 enum { NUMBERS = 999, RESIDUES = 9999, SERIALS = 99999 };
@@ -44,7 +46,9 @@ static void write_gaussian(const ovoid_ellipsoid *e, size_t index, double weight
             c[5]);
 }
 
-void ov_write_gmm(const ovoid_model *model, const ov_drawing *drawing, FILE *stream) {
+ovoid_status ov_write_gmm(ovoid_context *context, const ovoid_model *model,
+                          const ov_drawing *drawing, FILE *stream) {
+    ovoid_status status = OVOID_OK;
     const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
     const size_t count = ovoid_model_size(model);
     double total = 0.0;
@@ -59,7 +63,11 @@ void ov_write_gmm(const ovoid_model *model, const ov_drawing *drawing, FILE *str
             ovoid_version(), drawing->isovalue, total, count);
     if (count > NUMBERS)
         fprintf(stream, "REMARK COMMENT numbers begin again after %d\n", NUMBERS);
-    for (size_t i = 0; i < count && !ferror(stream); i++)
+    for (size_t i = 0; i < count && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, count));
         write_gaussian(&ellipsoids[i], i, integral(&ellipsoids[i]) / total, stream);
+    }
     fputs("TER\n", stream);
+cleanup:
+    return status;
 }

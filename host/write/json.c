@@ -1,6 +1,8 @@
 /* A model as JSON (RFC 8259), written as it goes: a tree of it would be many times its size. */
 #include "write/export.h"
 
+#include "base/progress.h"
+
 #include <string.h>
 
 /* Text that is no UTF-8 (a file name may be anything) is made so. */
@@ -44,7 +46,9 @@ static void write_ellipsoid(const ovoid_ellipsoid *e, double isovalue, FILE *str
     fprintf(stream, ", \"reaches_isovalue\": %s}", e->amplitude > isovalue ? "true" : "false");
 }
 
-void ov_write_json(const ovoid_model *model, const ov_drawing *drawing, FILE *stream) {
+ovoid_status ov_write_json(ovoid_context *context, const ovoid_model *model,
+                           const ov_drawing *drawing, FILE *stream) {
+    ovoid_status status = OVOID_OK;
     const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
     const char *note;
     fprintf(stream,
@@ -65,9 +69,12 @@ void ov_write_json(const ovoid_model *model, const ov_drawing *drawing, FILE *st
     fputs(ovoid_model_note(model, 0) ? "\n  ],\n" : "],\n", stream);
     fputs("  \"ellipsoids\": [\n", stream);
     for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, ovoid_model_size(model)));
         if (i)
             fputs(",\n", stream);
         write_ellipsoid(&ellipsoids[i], drawing->isovalue, stream);
     }
     fputs("\n  ]\n}\n", stream);
+cleanup:
+    return status;
 }

@@ -1,5 +1,6 @@
 #include "write/export.h"
 
+#include "base/progress.h"
 #include "field/evaluate.h"
 
 #include <math.h>
@@ -7,6 +8,9 @@
 
 /* Points computed at once: what the evaluation takes in one piece. */
 #define PIECE ((size_t)1 << 20)
+
+/* Of these, so many are written between two questions whether to go on. */
+#define SLICE ((size_t)1 << 16)
 
 /* 32 GiB of floats. */
 #define MOST_POINTS ((double)((uint64_t)1 << 33))
@@ -75,9 +79,11 @@ ovoid_status ov_map_run(ovoid_context *context, const ov_map *map, const int fas
         const size_t count = total - first < piece ? (size_t)(total - first) : piece;
         place_points(map, fast, first, count, xyz);
         OV_TRY(ov_evaluator_run(context, &evaluator, xyz, count, values, NULL));
-        sink(values, count, user);
-        if (!ferror(stream) && map->progress && !map->progress(first + count, total, map->user))
-            OV_TRY(ov_fail(context, OVOID_ERROR_CANCELLED, "the export was cancelled"));
+        for (size_t k = 0, some; k < count && !ferror(stream); k += some) {
+            some = count - k < SLICE ? count - k : SLICE;
+            sink(values + k, some, user);
+            OV_TRY(ov_progress_step(context, first + k + some, total));
+        }
     }
 
 cleanup:

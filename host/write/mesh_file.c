@@ -1,6 +1,7 @@
 #include "write/mesh_file.h"
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "write/text.h"
 
 typedef struct format {
@@ -22,8 +23,9 @@ static const format *find_format(const char *path) {
 }
 
 ovoid_status ovoid_mesh_write(ovoid_context *context, const ovoid_mesh *mesh, const char *path) {
-    if (!mesh || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_mesh_write: mesh or path is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, mesh);
+    OV_NEED(context, path);
     const format *chosen = find_format(path);
     if (!chosen)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
@@ -36,6 +38,7 @@ ovoid_status ovoid_mesh_write(ovoid_context *context, const ovoid_mesh *mesh, co
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
+    ov_progress_begin(context, "write");
     OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
     OV_TRY(chosen->write(context, mesh, output.stream));
@@ -45,5 +48,6 @@ ovoid_status ovoid_mesh_write(ovoid_context *context, const ovoid_mesh *mesh, co
 cleanup:
     ov_output_abandon(&output);
     ov_locale_leave(&locale);
+    ov_progress_end(context);
     return status;
 }

@@ -1,7 +1,8 @@
 /*
  * The formats of meshes, one file each. Every function writes the whole mesh to a stream, in the
  * order of its vertices and triangles, so that equal meshes give equal bytes. Coordinates are those
- * of the molecule's file, in angstrom. A failed write shows in the stream's error flag.
+ * of the molecule's file, in angstrom. A failed write shows in the stream's error flag; the
+ * context's progress callback may stop them.
  *
  * However a format rounds them, no two vertices become one and no triangle loses its area: programs
  * that merge equal vertices find a closed mesh.

@@ -1,6 +1,7 @@
 #include "write/model_file.h"
 
 #include "base/file.h"
+#include "base/progress.h"
 #include "write/text.h"
 
 #include <errno.h>
@@ -29,20 +30,26 @@ static void write_ellipsoid(const ovoid_ellipsoid *ellipsoid, FILE *stream) {
 }
 
 ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model, const char *path) {
-    if (!model || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_write: model or path is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    OV_NEED(context, path);
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
+    ov_progress_begin(context, "write");
     OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
     write_header(model, output.stream);
-    for (size_t i = 0; i < model->count && !ferror(output.stream); i++)
+    for (size_t i = 0; i < model->count && !ferror(output.stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, model->count));
         write_ellipsoid(&model->ellipsoids[i], output.stream);
+    }
     status = ov_output_commit(context, &output); /* reports a failed write too */
 
 cleanup:
+    ov_output_abandon(&output);
     ov_locale_leave(&locale);
+    ov_progress_end(context);
     return status;
 }
 
@@ -205,6 +212,9 @@ static ovoid_status read_lines(reader *r) {
     ovoid_status status = OVOID_OK;
     while ((status = next_line(r, &end)) == OVOID_OK && !end) {
         size_t at = skip_blanks(r, 0);
+        const ovoid_status asked = ov_progress_turn(r->context, r->line_number, 0);
+        if (asked != OVOID_OK)
+            return asked;
         if (at == r->length)
             continue;
         if (!begun)
@@ -221,14 +231,16 @@ static ovoid_status read_lines(reader *r) {
 }
 
 ovoid_status ovoid_model_read(ovoid_context *context, const char *path, ovoid_model **model) {
-    if (!path || !model)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_model_read: path or model is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, path);
+    OV_NEED(context, model);
     ovoid_status status = OVOID_OK;
     ov_locale locale = {0};
     bool standard_input = strcmp(path, "-") == 0;
     reader *r = ov_alloc(context, 1, sizeof *r, "reading a model");
     if (!r)
         return OVOID_ERROR_MEMORY;
+    ov_progress_begin(context, "read");
     r->context = context;
     r->name = standard_input ? "standard input" : path;
     r->decay = r->isovalue = NAN;
@@ -239,6 +251,7 @@ ovoid_status ovoid_model_read(ovoid_context *context, const char *path, ovoid_mo
     if (!r->stream)
         OV_TRY(ov_fail(context, OVOID_ERROR_IO, "cannot read '%s': %s", path, strerror(errno)));
     OV_TRY(ov_locale_enter(context, &locale));
+    OV_TRY(ov_progress_ask(context));
     OV_TRY(read_lines(r));
     r->model->decay = isnan(r->decay) ? OVOID_DEFAULT_DECAY : r->decay;
     r->model->isovalue = isnan(r->isovalue) ? OVOID_DEFAULT_ISOVALUE : r->isovalue;
@@ -255,5 +268,6 @@ cleanup:
     ovoid_model_destroy(&r->model);
     free(r->ellipsoids);
     free(r);
+    ov_progress_end(context);
     return status;
 }

@@ -1,4 +1,5 @@
 /* PLY, binary: "The PLY Polygon File Format" (G. Turk, 1994). */
+#include "base/progress.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -24,7 +25,7 @@ static void put_place(ov_bytes *bytes, const ovoid_mesh *mesh, size_t vertex, bo
 
 /* Coordinates are floats, as readers expect, or where these are too coarse doubles. */
 ovoid_status ov_write_ply(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream) {
-    (void)context;
+    ovoid_status status = OVOID_OK;
     const size_t vertices = ovoid_mesh_vertices(mesh), triangles = ovoid_mesh_triangles(mesh);
     const float *normals = ovoid_mesh_normals(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
@@ -42,16 +43,19 @@ ovoid_status ov_write_ply(ovoid_context *context, const ovoid_mesh *mesh, FILE *
             "property list uchar %s vertex_indices\n"
             "end_header\n",
             ovoid_version(), vertices, type, type, type, triangles, index_type(vertices));
-    for (size_t i = 0; i < vertices; i++) {
+    for (size_t i = 0; i < vertices && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, vertices));
         put_place(&bytes, mesh, i, floats);
         for (size_t axis = 0; axis < 3; axis++)
             ov_put_f32(&bytes, normals[3 * i + axis]);
     }
-    for (size_t i = 0; i < triangles; i++) {
+    for (size_t i = 0; i < triangles && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, triangles));
         ov_put_u8(&bytes, 3);
         for (size_t corner = 0; corner < 3; corner++)
             ov_put_u32(&bytes, corners[3 * i + corner]);
     }
     ov_bytes_flush(&bytes);
-    return OVOID_OK;
+cleanup:
+    return status;
 }

@@ -1,6 +1,7 @@
 #include "write/png.h"
 
 #include "base/file.h"
+#include "base/progress.h"
 
 #include <png.h>
 #include <setjmp.h>
@@ -8,9 +9,11 @@
 #include <string.h>
 
 typedef struct writer {
+    ovoid_context *context;
     FILE *stream;
-    char error[128]; /* libpng's message */
-    uint8_t *row;    /* RGB of one row, NULL for RGBA */
+    ovoid_status status; /* of what stopped the writing, if not libpng */
+    char error[128];     /* libpng's message */
+    uint8_t *row;        /* RGB of one row, NULL for RGBA */
 } writer;
 
 /* A failed write is left to the stream, which remembers it: going on costs nothing but time. */
@@ -52,7 +55,7 @@ static const uint8_t *row_of(const ovoid_image *image, const writer *w, uint32_t
 }
 
 /* Nothing here may live in a local variable across libpng's long jumps. */
-static bool write_all(png_structp png, png_infop info, const ovoid_image *image, const writer *w) {
+static bool write_all(png_structp png, png_infop info, const ovoid_image *image, writer *w) {
     if (setjmp(png_jmpbuf(png)))
         return false;
     png_set_IHDR(png, info, image->width, image->height, 8,
@@ -61,15 +64,19 @@ static bool write_all(png_structp png, png_infop info, const ovoid_image *image,
     png_set_sRGB_gAMA_and_cHRM(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
     png_set_compression_level(png, 7);
     png_write_info(png, info);
-    for (uint32_t y = 0; y < image->height; ++y)
+    for (uint32_t y = 0; y < image->height; ++y) {
+        w->status = ov_progress_step(w->context, y, image->height);
+        if (w->status != OVOID_OK)
+            return false;
         png_write_row(png, row_of(image, w, y));
+    }
     png_write_end(png, info);
     return true;
 }
 
 ovoid_status ov_png_write(ovoid_context *context, const ovoid_image *image, FILE *stream) {
     ovoid_status status = OVOID_OK;
-    writer w = {.stream = stream};
+    writer w = {.context = context, .stream = stream};
     png_structp png = NULL;
     png_infop info = NULL;
     if (is_opaque(image)) {
@@ -85,7 +92,8 @@ ovoid_status ov_png_write(ovoid_context *context, const ovoid_image *image, FILE
     }
     png_set_write_fn(png, &w, on_write, on_flush);
     if (!write_all(png, info, image, &w))
-        status = ov_fail(context, OVOID_ERROR_MEMORY, "libpng: %s", w.error);
+        status = w.status != OVOID_OK ? w.status
+                                      : ov_fail(context, OVOID_ERROR_MEMORY, "libpng: %s", w.error);
 cleanup:
     png_destroy_write_struct(&png, &info);
     free(w.row);
@@ -93,15 +101,17 @@ cleanup:
 }
 
 ovoid_status ovoid_image_write(ovoid_context *context, const ovoid_image *image, const char *path) {
-    if (!image || !path)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_image_write: an argument is NULL");
+    OV_NEED(context, context);
+    OV_NEED(context, image);
+    OV_NEED(context, path);
+    ovoid_status status = OVOID_OK;
     ov_output output = {0};
-    ovoid_status status = ov_output_open(context, path, &output);
-    if (status != OVOID_OK)
-        return status;
-    status = ov_png_write(context, image, output.stream);
-    if (status == OVOID_OK)
-        return ov_output_commit(context, &output); /* reports a failed write too */
+    ov_progress_begin(context, "write");
+    OV_TRY(ov_output_open(context, path, &output));
+    OV_TRY(ov_png_write(context, image, output.stream));
+    status = ov_output_commit(context, &output); /* reports a failed write too */
+cleanup:
     ov_output_abandon(&output);
+    ov_progress_end(context);
     return status;
 }

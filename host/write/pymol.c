@@ -3,6 +3,8 @@
  * multiplies; so the size is the longest semi-axis. */
 #include "write/export.h"
 
+#include "base/progress.h"
+
 #include <math.h>
 
 static void write_ellipsoid(const ov_solid *s, FILE *stream) {
@@ -17,7 +19,9 @@ static void write_ellipsoid(const ov_solid *s, FILE *stream) {
     putc('\n', stream);
 }
 
-void ov_write_pymol(const ovoid_model *model, const ov_drawing *drawing, FILE *stream) {
+ovoid_status ov_write_pymol(ovoid_context *context, const ovoid_model *model,
+                            const ov_drawing *drawing, FILE *stream) {
+    ovoid_status status = OVOID_OK;
     const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
     fprintf(stream,
             "# Ovoid %s, lengths in angstrom, ellipsoids at isovalue %.9g.\n"
@@ -30,10 +34,13 @@ void ov_write_pymol(const ovoid_model *model, const ov_drawing *drawing, FILE *s
             ovoid_version(), drawing->isovalue, drawing->opacity, drawing->colour[0],
             drawing->colour[1], drawing->colour[2]);
     for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, ovoid_model_size(model)));
         ov_solid s;
         ov_solid_of_ellipsoid(&ellipsoids[i], drawing->isovalue, &s);
         write_ellipsoid(&s, stream);
     }
     /* The structure often has the same name, and an object of that name would be replaced. */
     fprintf(stream, "]\ncmd.load_cgo(ellipsoids, '%s_ellipsoids')\n", drawing->title);
+cleanup:
+    return status;
 }

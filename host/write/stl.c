@@ -1,5 +1,6 @@
 /* STL, binary: 80 bytes of text, a count, then per triangle its normal, its corners and two bytes
  * (3D Systems, "StereoLithography Interface Specification", 1989). */
+#include "base/progress.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -23,6 +24,7 @@ static void triangle_normal(const double *a, const double *b, const double *c, d
 }
 
 ovoid_status ov_write_stl(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream) {
+    ovoid_status status = OVOID_OK;
     const size_t triangles = ovoid_mesh_triangles(mesh);
     const double *xyz = ovoid_mesh_xyz(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
@@ -42,7 +44,8 @@ ovoid_status ov_write_stl(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     snprintf(header, sizeof header, "Ovoid %s, lengths in angstrom", ovoid_version());
     ov_put_text(&bytes, header, HEADER);
     ov_put_u32(&bytes, (uint32_t)triangles);
-    for (size_t i = 0; i < triangles; i++) {
+    for (size_t i = 0; i < triangles && !ferror(stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, triangles));
         const double *at[3];
         double normal[3];
         for (size_t corner = 0; corner < 3; corner++)
@@ -59,5 +62,6 @@ ovoid_status ov_write_stl(ovoid_context *context, const ovoid_mesh *mesh, FILE *
         ov_put_u16(&bytes, 0);
     }
     ov_bytes_flush(&bytes);
-    return OVOID_OK;
+cleanup:
+    return status;
 }

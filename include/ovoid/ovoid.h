@@ -13,7 +13,12 @@
  *   ovoid_context_error() describes what happened, with file, line, OpenCL call or device.
  * - xxx_destroy(xxx **) frees, sets the pointer to NULL, and accepts NULL and repeats. Whatever a
  *   function hands out as a pointer to const belongs to the object it came from.
- * - The library prints nothing, never exits and installs no signal handler.
+ * - NULL, where it has no meaning of its own: a function that returns a status returns
+ *   OVOID_ERROR_ARGUMENT and names the argument; one that answers a question answers 0, NULL, NAN
+ * or
+ *   "", as if of nothing; all others, such as xxx_options_init(), do nothing.
+ * - The library prints nothing, never exits, installs no signal handler and does not touch the
+ *   environment (but see ovoid_prepare_process()).
  * - A context and what is made with it may be used by one thread at a time; different contexts are
  *   independent.
  */
@@ -74,7 +79,57 @@ OVOID_API const char *ovoid_context_error(const ovoid_context *context);
 typedef void (*ovoid_warning_fn)(const char *text, void *user);
 OVOID_API void ovoid_context_on_warning(ovoid_context *context, ovoid_warning_fn fn, void *user);
 
+/* ---- progress ----------------------------------------------------------------------------- */
+
+/* What a function that may take long is doing. */
+typedef struct ovoid_progress {
+    const char *stage;    /* one word: "read" or "write" (a file), "open" (a device), "compile"
+                             (kernels), "field", "mesh", "measure" (distances), "map", "render"; of
+                             a fit also "sample"; of l1 "sparse" or "accuracy"; of adaptive "merge",
+                             "refine", "repair", "grow" or "shrink" */
+    uint64_t done, total; /* of this stage, in parts of its own; total 0: nobody knows how many */
+    double seconds;       /* since the function that was called began */
+    /* The rest is of fits alone, else 0. */
+    uint64_t iteration;  /* 1 .. iterations; 0 before the first */
+    uint64_t iterations; /* how many there will be at most; 0 where nobody knows (adaptive) */
+    uint64_t ellipsoids;
+    uint64_t points;      /* while sampling, so far */
+    double accuracy_term; /* E_s = sum_k (phi~ - phi)^2 over the constrained points; of adaptive the
+                             sum of weighted squared residuals */
+    double sparse_term;   /* E_l1 = sum_i |c_i| + |d_i1| + |d_i2| + |d_i3|, square-root variables */
+    double accuracy_weight; /* w_s */
+    double sparse_weight;   /* w_l */
+    double objective;       /* w_s E_s + w_l E_l1 */
+    double max_error;       /* max_k |phi~ - phi| */
+    double step;            /* tau of the line search, 0 where no descent was found */
+} ovoid_progress;
+
+/* Returns true to go on, false to stop: the function that was called then frees what it has made,
+ * leaves its outputs untouched and no file behind, and returns OVOID_ERROR_CANCELLED. */
+typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
+
+/* Calls fn from now on while a function with this context is at work that may take long: reading,
+ * writing, opening a device, compiling kernels, fields, fits, meshes, distances, measures, maps,
+ * pictures. NULL, as at first: none.
+ *
+ * It is called on the thread that called the library, often: before every launch of a kernel and
+ * between pieces of what is done on the host, the same state more than once, in a fit also after
+ * each iteration. On a usual device a few milliseconds lie between two calls, and seldom more than
+ * half a second; what a driver does in one go, such as compiling, is not interrupted. It should
+ * return soon. It may use other contexts and read what objects hold, but not call what takes this
+ * context, except ovoid_context_error(), and must return: no longjmp(), no C++ exception. *progress
+ * and its text are valid until then. */
+OVOID_API void ovoid_context_on_progress(ovoid_context *context, ovoid_progress_fn fn, void *user);
+
 /* ---- devices ------------------------------------------------------------------------------ */
+
+/* For a program to call at its beginning, before it has other threads and before it uses OpenCL:
+ * where PoCL cannot keep compiled kernels in its folder (full, not writable, or on a file system
+ * mounted noexec, which would end the process), POCL_CACHE_DIR is set to another one. This is the
+ * only function that touches the environment, which no thread may read meanwhile; a program that
+ * does not call it loses PoCL's devices in such a case. The first context that lists devices warns
+ * of what was done. */
+OVOID_API void ovoid_prepare_process(void);
 
 typedef enum ovoid_device_type {
     OVOID_DEVICE_CPU,
@@ -369,9 +424,10 @@ OVOID_API ovoid_status ovoid_file_create(ovoid_context *context, const char *pat
 OVOID_API ovoid_status ovoid_file_write(ovoid_context *context, ovoid_file *file, const void *data,
                                         size_t bytes);
 
-/* Path of the temporary file, NULL when there is none (any more). For signal handlers, which cannot
- * call ovoid_file_destroy() but may unlink(). */
-OVOID_API const char *ovoid_file_temporary(const ovoid_file *file);
+/* Removes the temporary files of all outputs under way in this process, in every context. For a
+ * signal handler that is about to end the process, and safe there (async-signal-safe): whoever
+ * writes one of the files meets an error afterwards. */
+OVOID_API void ovoid_remove_temporaries(void);
 
 /* Writes out what is buffered and gives the file its name. On success and on failure alike the file
  * takes no more data; on failure nothing is left of it. */
@@ -475,30 +531,6 @@ typedef enum ovoid_method {
     OVOID_METHOD_L1            /* the paper's Algorithm 1 */
 } ovoid_method;
 
-/* What a progress callback sees: while sampling after each piece of the lattice (with the points so
- * far), then after each iteration, and of adaptive between the pieces of what is meshed and
- * measured (with the iteration before). */
-typedef struct ovoid_progress {
-    const char *stage;   /* "sample"; of l1 "sparse" or "accuracy"; of adaptive "mesh", "merge",
-                            "refine", "repair", "grow" or "shrink" */
-    uint64_t iteration;  /* 1 .. iterations; 0 before the first */
-    uint64_t iterations; /* how many there will be at most; 0 where nobody knows (adaptive) */
-    uint64_t ellipsoids;
-    uint64_t points;
-    double accuracy_term; /* E_s = sum_k (phi~ - phi)^2 over the constrained points; of adaptive the
-                             sum of weighted squared residuals */
-    double sparse_term;   /* E_l1 = sum_i |c_i| + |d_i1| + |d_i2| + |d_i3|, square-root variables */
-    double accuracy_weight; /* w_s */
-    double sparse_weight;   /* w_l */
-    double objective;       /* w_s E_s + w_l E_l1 */
-    double max_error;       /* max_k |phi~ - phi| */
-    double step;            /* tau of the line search, 0 where no descent was found */
-    double seconds;         /* since the fit began */
-} ovoid_progress;
-
-/* Returns true to go on, false to stop with OVOID_ERROR_CANCELLED. */
-typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
-
 /* What each atom's Gaussian may become. */
 typedef enum ovoid_kernel {
     OVOID_KERNEL_ELLIPSOID = 0, /* the paper's model: all ten parameters move, E_l1 is eq. 3.3 */
@@ -568,8 +600,6 @@ typedef struct ovoid_fit_options {
                         field needs, if that is more */
     ovoid_adaptive_options adaptive;
     ovoid_l1_options l1;
-    ovoid_progress_fn progress; /* may be NULL */
-    void *user;
 } ovoid_fit_options;
 
 /* Where the time of a fit went, and how much was done. The seconds are measured on the host between

@@ -166,10 +166,6 @@ typedef enum ovoid_export_format {
     OVOID_EXPORT_DX    /* .dx: OpenDX text as APBS writes it */
 } ovoid_export_format;
 
-/* Points of a map done so far, of how many. Returns true to go on, false to stop with
- * OVOID_ERROR_CANCELLED. */
-typedef bool (*ovoid_export_progress_fn)(uint64_t points, uint64_t total, void *user);
-
 typedef struct ovoid_export_options {
     ovoid_export_format format;
     /* c. An ellipsoid is drawn where its own Gaussian is c: with semi-axes sqrt(ln(a / c) / d_p).
@@ -177,12 +173,10 @@ typedef struct ovoid_export_options {
      * sqrt(ln 2 / d_p). A map reaches to where each Gaussian has fallen to c / 100. 0: the model's,
      * or OVOID_DEFAULT_ISOVALUE of a molecule. */
     double isovalue;
-    double spacing;                    /* of a map, angstrom; its points are multiples of it */
-    double colour[3];                  /* red, green, blue from 0 to 1, of drawn ellipsoids */
-    double opacity;                    /* from 0 to 1, of drawn ellipsoids */
-    double max_gigabytes;              /* a map that would take more (1e9 bytes each) is refused */
-    ovoid_export_progress_fn progress; /* may be NULL; maps alone ask it */
-    void *user;
+    double spacing;       /* of a map, angstrom; its points are multiples of it */
+    double colour[3];     /* red, green, blue from 0 to 1, of drawn ellipsoids */
+    double opacity;       /* from 0 to 1, of drawn ellipsoids */
+    double max_gigabytes; /* a map that would take more (1e9 bytes each) is refused */
 } ovoid_export_options;
 
 #define OVOID_DEFAULT_MAP_GIGABYTES 1.0

@@ -1,0 +1,387 @@
+/*
+ * NULL in the place of each argument of each public function: the one rule of ovoid.h. A function
+ * that the headers declare and no line here names fails the last test.
+ */
+#include "support.h"
+
+#include "ovoid/surface.h"
+
+#include <ctype.h>
+
+enum { MOST = 256 };
+
+typedef struct subject {
+    ovoid_context *context;
+    const char *tried[MOST]; /* names of functions */
+    size_t count;
+    ovoid_molecule *molecule;
+    ovoid_model *model;
+    ovoid_mesh *mesh;
+    ovoid_image *image;
+} subject;
+
+static subject all;
+
+static void try(const char *function) {
+    assert_true(all.count < MOST);
+    all.tried[all.count++] = function;
+}
+
+/* The status, and with a context the text as well. */
+static void refused(const char *function, const char *argument, ovoid_status status) {
+    char wanted[128];
+    try(function);
+    snprintf(wanted, sizeof wanted, "%s: %s is NULL", function, argument);
+    print_message("%s\n", wanted);
+    assert_int_equal(status, OVOID_ERROR_ARGUMENT);
+    if (strcmp(argument, "context") != 0)
+        assert_int_equal(strncmp(ovoid_context_error(all.context), wanted, strlen(wanted)), 0);
+}
+
+#define REFUSED(function, argument, ...) refused(#function, #argument, function(__VA_ARGS__))
+#define ANSWERS(wanted, function, ...)                                                             \
+    do {                                                                                           \
+        try(#function);                                                                            \
+        assert_true(function(__VA_ARGS__) == (wanted));                                            \
+    } while (0)
+#define UNKNOWN(function)                                                                          \
+    do {                                                                                           \
+        try(#function);                                                                            \
+        assert_true(isnan(function(NULL)));                                                        \
+    } while (0)
+#define DOES_NOTHING(function, ...)                                                                \
+    do {                                                                                           \
+        try(#function);                                                                            \
+        function(__VA_ARGS__);                                                                     \
+    } while (0)
+
+static const double xyzr[4] = {0.0, 0.0, 0.0, 1.5};
+static const double corners_xyz[9] = {0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+static const uint32_t corners[3] = {0, 1, 2};
+static const ovoid_ellipsoid one = {.amplitude = 2.0, .decay = {0.5, 0.5, 0.5}};
+static const uint8_t pixel[4] = {0, 0, 0, 255};
+
+static int make_subject(void **state) {
+    (void)state;
+    return ovoid_context_create(&all.context) == OVOID_OK &&
+                   ovoid_molecule_create(all.context, xyzr, 1, &all.molecule) == OVOID_OK &&
+                   ovoid_model_create(all.context, &one, 1, 0.5, 1.0, &all.model) == OVOID_OK &&
+                   ovoid_mesh_create(all.context, corners_xyz, NULL, 3, corners, 1, &all.mesh) ==
+                       OVOID_OK &&
+                   ovoid_image_create(all.context, 1, 1, pixel, &all.image) == OVOID_OK
+               ? 0
+               : -1;
+}
+
+static int drop_subject(void **state) {
+    (void)state;
+    ovoid_image_destroy(&all.image);
+    ovoid_mesh_destroy(&all.mesh);
+    ovoid_model_destroy(&all.model);
+    ovoid_molecule_destroy(&all.molecule);
+    ovoid_context_destroy(&all.context);
+    return 0;
+}
+
+static void contexts_and_devices(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    ovoid_device_info *devices;
+    ovoid_kernel_time *times;
+    size_t count;
+    try("ovoid_context_create");
+    assert_int_equal(ovoid_context_create(NULL), OVOID_ERROR_ARGUMENT);
+    try("ovoid_context_error");
+    assert_string_equal(ovoid_context_error(NULL), "");
+    DOES_NOTHING(ovoid_context_on_warning, NULL, NULL, NULL);
+    DOES_NOTHING(ovoid_context_on_progress, NULL, NULL, NULL);
+    REFUSED(ovoid_devices, context, NULL, &devices, &count);
+    REFUSED(ovoid_devices, devices, c, NULL, &count);
+    REFUSED(ovoid_devices, count, c, &devices, NULL);
+    REFUSED(ovoid_context_open_device, context, NULL, "");
+    ANSWERS(NULL, ovoid_context_device, NULL);
+    REFUSED(ovoid_context_profile, context, NULL, true);
+    REFUSED(ovoid_context_kernel_times, context, NULL, &times, &count);
+    REFUSED(ovoid_context_kernel_times, times, c, NULL, &count);
+    REFUSED(ovoid_context_kernel_times, count, c, &times, NULL);
+}
+
+static void destroyers(void **state) {
+    (void)state;
+    ovoid_context *context = NULL;
+    ovoid_molecule *molecule = NULL;
+    ovoid_model *model = NULL;
+    ovoid_mesh *mesh = NULL;
+    ovoid_image *image = NULL;
+    ovoid_file *file = NULL;
+    DOES_NOTHING(ovoid_context_destroy, NULL);
+    DOES_NOTHING(ovoid_context_destroy, &context);
+    DOES_NOTHING(ovoid_molecule_destroy, NULL);
+    DOES_NOTHING(ovoid_molecule_destroy, &molecule);
+    DOES_NOTHING(ovoid_model_destroy, NULL);
+    DOES_NOTHING(ovoid_model_destroy, &model);
+    DOES_NOTHING(ovoid_mesh_destroy, NULL);
+    DOES_NOTHING(ovoid_mesh_destroy, &mesh);
+    DOES_NOTHING(ovoid_image_destroy, NULL);
+    DOES_NOTHING(ovoid_image_destroy, &image);
+    DOES_NOTHING(ovoid_file_destroy, NULL);
+    DOES_NOTHING(ovoid_file_destroy, &file);
+    DOES_NOTHING(ovoid_free, NULL);
+}
+
+static void defaults(void **state) {
+    (void)state;
+    DOES_NOTHING(ovoid_read_options_init, NULL, sizeof(ovoid_read_options));
+    DOES_NOTHING(ovoid_fit_options_init, NULL);
+    DOES_NOTHING(ovoid_mesh_options_init, NULL);
+    DOES_NOTHING(ovoid_measure_options_init, NULL);
+    DOES_NOTHING(ovoid_export_options_init, NULL);
+    DOES_NOTHING(ovoid_picture_options_init, NULL);
+}
+
+/* Nothing can be NULL in a call of these. */
+static void without_pointers(void **state) {
+    (void)state;
+    try("ovoid_version");
+    try("ovoid_status_name");
+    try("ovoid_radii_name");
+    try("ovoid_export_format_name");
+    DOES_NOTHING(ovoid_remove_temporaries, );
+    DOES_NOTHING(ovoid_prepare_process, );
+}
+
+static void molecules(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    ovoid_molecule *made;
+    size_t count = 7;
+    REFUSED(ovoid_molecule_read, context, NULL, "a.pqr", OVOID_MOLECULE_AUTO, &made);
+    REFUSED(ovoid_molecule_read, path, c, NULL, OVOID_MOLECULE_AUTO, &made);
+    REFUSED(ovoid_molecule_read, molecule, c, "a.pqr", OVOID_MOLECULE_AUTO, NULL);
+    REFUSED(ovoid_molecule_read_with, context, NULL, "a.pqr", NULL, &made);
+    REFUSED(ovoid_molecule_read_with, path, c, NULL, NULL, &made);
+    REFUSED(ovoid_molecule_read_with, molecule, c, "a.pqr", NULL, NULL);
+    REFUSED(ovoid_molecule_create, context, NULL, xyzr, 1, &made);
+    REFUSED(ovoid_molecule_create, xyzr, c, NULL, 1, &made);
+    REFUSED(ovoid_molecule_create, molecule, c, xyzr, 1, NULL);
+    REFUSED(ovoid_molecule_expand, context, NULL, all.molecule);
+    REFUSED(ovoid_molecule_expand, molecule, c, NULL);
+    ANSWERS(0, ovoid_molecule_atoms, NULL);
+    ANSWERS(NULL, ovoid_molecule_xyzr, NULL);
+    try("ovoid_molecule_read_counts");
+    const ovoid_molecule_counts none = {0}, counts = ovoid_molecule_read_counts(NULL);
+    assert_memory_equal(&counts, &none, sizeof none);
+    ANSWERS(OVOID_MOLECULE_AUTO, ovoid_molecule_read_format, NULL);
+    ANSWERS(OVOID_RADII_DEFAULT, ovoid_molecule_radii, NULL);
+    ANSWERS(0, ovoid_molecule_model, NULL);
+    ANSWERS(NULL, ovoid_molecule_identity, NULL);
+    ANSWERS(NULL, ovoid_molecule_residues, NULL, &count);
+    assert_int_equal(count, 0);
+    ANSWERS(NULL, ovoid_molecule_residues, all.molecule, NULL);
+    ANSWERS(NULL, ovoid_molecule_guesses, NULL, &count);
+    ANSWERS(NULL, ovoid_molecule_guesses, all.molecule, NULL);
+    ANSWERS(NULL, ovoid_molecule_assemblies, NULL, &count);
+    ANSWERS(NULL, ovoid_molecule_assemblies, all.molecule, NULL);
+    ANSWERS(NULL, ovoid_molecule_placements, NULL, &count);
+    ANSWERS(NULL, ovoid_molecule_placements, all.molecule, NULL);
+    ANSWERS(NULL, ovoid_molecule_part, NULL, 0, &count);
+    ANSWERS(NULL, ovoid_molecule_part, all.molecule, 0, NULL);
+    ANSWERS(0, ovoid_molecule_unit_atoms, NULL);
+    ANSWERS(NULL, ovoid_molecule_unit_xyzr, NULL);
+    ANSWERS(0, ovoid_molecule_origin, NULL, 3, &count);
+    ANSWERS(0, ovoid_molecule_origin, all.molecule, 0, NULL);
+}
+
+static void files(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    ovoid_file *file = NULL;
+    REFUSED(ovoid_file_check, context, NULL, "-");
+    REFUSED(ovoid_file_check, path, c, NULL);
+    REFUSED(ovoid_file_create, context, NULL, "-", &file);
+    REFUSED(ovoid_file_create, path, c, NULL, &file);
+    REFUSED(ovoid_file_create, file, c, "-", NULL);
+    test_check(c, ovoid_file_create(c, "/dev/null", &file));
+    REFUSED(ovoid_file_write, context, NULL, file, "a", 1);
+    REFUSED(ovoid_file_write, file, c, NULL, "a", 1);
+    REFUSED(ovoid_file_write, data, c, file, NULL, 1);
+    REFUSED(ovoid_file_commit, context, NULL, file);
+    REFUSED(ovoid_file_commit, file, c, NULL);
+    ovoid_file_destroy(&file);
+}
+
+static void fields_and_models(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    ovoid_model *made;
+    ovoid_fit_options options;
+    double value;
+    ovoid_fit_options_init(&options);
+    REFUSED(ovoid_molecule_field, context, NULL, all.molecule, 0.5, xyzr, 1, &value, NULL);
+    REFUSED(ovoid_molecule_field, molecule, c, NULL, 0.5, xyzr, 1, &value, NULL);
+    REFUSED(ovoid_molecule_field, xyz, c, all.molecule, 0.5, NULL, 1, &value, NULL);
+    REFUSED(ovoid_molecule_field, value, c, all.molecule, 0.5, xyzr, 1, NULL, NULL);
+    REFUSED(ovoid_model_field, context, NULL, all.model, xyzr, 1, &value, NULL);
+    REFUSED(ovoid_model_field, model, c, NULL, xyzr, 1, &value, NULL);
+    REFUSED(ovoid_model_field, xyz, c, all.model, NULL, 1, &value, NULL);
+    REFUSED(ovoid_model_field, value, c, all.model, xyzr, 1, NULL, NULL);
+    REFUSED(ovoid_model_create, context, NULL, &one, 1, 0.5, 1.0, &made);
+    REFUSED(ovoid_model_create, ellipsoids, c, NULL, 1, 0.5, 1.0, &made);
+    REFUSED(ovoid_model_create, model, c, &one, 1, 0.5, 1.0, NULL);
+    ANSWERS(0, ovoid_model_size, NULL);
+    ANSWERS(NULL, ovoid_model_ellipsoids, NULL);
+    UNKNOWN(ovoid_model_decay);
+    UNKNOWN(ovoid_model_isovalue);
+    ANSWERS(NULL, ovoid_model_owner, NULL);
+    ANSWERS(0, ovoid_model_owner_count, NULL);
+    ANSWERS(NULL, ovoid_model_note, NULL, 0);
+    REFUSED(ovoid_model_annotate, context, NULL, all.model, "a", "b");
+    REFUSED(ovoid_model_annotate, model, c, NULL, "a", "b");
+    REFUSED(ovoid_model_annotate, key, c, all.model, NULL, "b");
+    REFUSED(ovoid_model_annotate, value, c, all.model, "a", NULL);
+    REFUSED(ovoid_model_read, context, NULL, "a.ovoid", &made);
+    REFUSED(ovoid_model_read, path, c, NULL, &made);
+    REFUSED(ovoid_model_read, model, c, "a.ovoid", NULL);
+    REFUSED(ovoid_model_write, context, NULL, all.model, "/dev/null");
+    REFUSED(ovoid_model_write, model, c, NULL, "/dev/null");
+    REFUSED(ovoid_model_write, path, c, all.model, NULL);
+    REFUSED(ovoid_fit, context, NULL, all.molecule, &options, &made, NULL);
+    REFUSED(ovoid_fit, molecule, c, NULL, &options, &made, NULL);
+    REFUSED(ovoid_fit, options, c, all.molecule, NULL, &made, NULL);
+    REFUSED(ovoid_fit, model, c, all.molecule, &options, NULL, NULL);
+}
+
+static void meshes(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    ovoid_mesh *made;
+    ovoid_mesh_options options;
+    ovoid_measure_options measuring;
+    ovoid_measures measures;
+    ovoid_distances distances;
+    const double *const xyz = corners_xyz;
+    ovoid_mesh_options_init(&options);
+    ovoid_measure_options_init(&measuring);
+    REFUSED(ovoid_molecule_mesh, context, NULL, all.molecule, 0.5, &options, &made);
+    REFUSED(ovoid_molecule_mesh, molecule, c, NULL, 0.5, &options, &made);
+    REFUSED(ovoid_molecule_mesh, options, c, all.molecule, 0.5, NULL, &made);
+    REFUSED(ovoid_molecule_mesh, mesh, c, all.molecule, 0.5, &options, NULL);
+    REFUSED(ovoid_model_mesh, context, NULL, all.model, &options, &made);
+    REFUSED(ovoid_model_mesh, model, c, NULL, &options, &made);
+    REFUSED(ovoid_model_mesh, options, c, all.model, NULL, &made);
+    REFUSED(ovoid_model_mesh, mesh, c, all.model, &options, NULL);
+    REFUSED(ovoid_mesh_create, context, NULL, xyz, NULL, 3, corners, 1, &made);
+    REFUSED(ovoid_mesh_create, xyz, c, NULL, NULL, 3, corners, 1, &made);
+    REFUSED(ovoid_mesh_create, corners, c, xyz, NULL, 3, NULL, 1, &made);
+    REFUSED(ovoid_mesh_create, mesh, c, xyz, NULL, 3, corners, 1, NULL);
+    ANSWERS(0, ovoid_mesh_vertices, NULL);
+    ANSWERS(0, ovoid_mesh_triangles, NULL);
+    ANSWERS(NULL, ovoid_mesh_xyz, NULL);
+    ANSWERS(NULL, ovoid_mesh_normals, NULL);
+    ANSWERS(NULL, ovoid_mesh_corners, NULL);
+    ANSWERS(NULL, ovoid_mesh_component_of, NULL);
+    ANSWERS(0, ovoid_mesh_components, NULL);
+    ANSWERS(NULL, ovoid_mesh_component, NULL, 0);
+    UNKNOWN(ovoid_mesh_area);
+    UNKNOWN(ovoid_mesh_volume);
+    UNKNOWN(ovoid_mesh_smooth_area);
+    UNKNOWN(ovoid_mesh_smooth_volume);
+    REFUSED(ovoid_mesh_write, context, NULL, all.mesh, "a.ply");
+    REFUSED(ovoid_mesh_write, mesh, c, NULL, "a.ply");
+    REFUSED(ovoid_mesh_write, path, c, all.mesh, NULL);
+    REFUSED(ovoid_mesh_distances, context, NULL, all.mesh, all.mesh, false, &distances, NULL);
+    REFUSED(ovoid_mesh_distances, a, c, NULL, all.mesh, false, &distances, NULL);
+    REFUSED(ovoid_mesh_distances, b, c, all.mesh, NULL, false, &distances, NULL);
+    REFUSED(ovoid_mesh_distances, distances, c, all.mesh, all.mesh, false, NULL, NULL);
+    REFUSED(ovoid_measure, context, NULL, all.molecule, all.model, &measuring, &measures);
+    REFUSED(ovoid_measure, molecule, c, NULL, all.model, &measuring, &measures);
+    REFUSED(ovoid_measure, model, c, all.molecule, NULL, &measuring, &measures);
+    REFUSED(ovoid_measure, options, c, all.molecule, all.model, NULL, &measures);
+    REFUSED(ovoid_measure, measures, c, all.molecule, all.model, &measuring, NULL);
+}
+
+static void exports_and_pictures(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    ovoid_image *made;
+    ovoid_picture_options options;
+    const uint8_t *const pixels = pixel;
+    ovoid_picture_options_init(&options);
+    REFUSED(ovoid_model_export, context, NULL, all.model, "a.bild", NULL);
+    REFUSED(ovoid_model_export, model, c, NULL, "a.bild", NULL);
+    REFUSED(ovoid_model_export, path, c, all.model, NULL, NULL);
+    REFUSED(ovoid_molecule_export, context, NULL, all.molecule, 0.5, "a.mrc", NULL);
+    REFUSED(ovoid_molecule_export, molecule, c, NULL, 0.5, "a.mrc", NULL);
+    REFUSED(ovoid_molecule_export, path, c, all.molecule, 0.5, NULL, NULL);
+    ANSWERS(OVOID_EXPORT_AUTO, ovoid_export_format_find, NULL);
+    REFUSED(ovoid_render, context, NULL, all.molecule, 0.5, all.model, &options, &made);
+    REFUSED(ovoid_render, options, c, all.molecule, 0.5, all.model, NULL, &made);
+    REFUSED(ovoid_render, image, c, all.molecule, 0.5, all.model, &options, NULL);
+    REFUSED(ovoid_render, molecule, c, NULL, 0.5, all.model, &options, &made);
+    options.view = OVOID_VIEW_MODEL;
+    REFUSED(ovoid_render, model, c, all.molecule, 0.5, NULL, &options, &made);
+    REFUSED(ovoid_image_create, context, NULL, 1, 1, pixels, &made);
+    REFUSED(ovoid_image_create, pixels, c, 1, 1, NULL, &made);
+    REFUSED(ovoid_image_create, image, c, 1, 1, pixels, NULL);
+    ANSWERS(0, ovoid_image_width, NULL);
+    ANSWERS(0, ovoid_image_height, NULL);
+    ANSWERS(NULL, ovoid_image_pixels, NULL);
+    ANSWERS(0, ovoid_image_covered, NULL);
+    UNKNOWN(ovoid_image_range);
+    REFUSED(ovoid_image_write, context, NULL, all.image, "/dev/null");
+    REFUSED(ovoid_image_write, image, c, NULL, "/dev/null");
+    REFUSED(ovoid_image_write, path, c, all.image, NULL);
+}
+
+/* ---- all of them? ------------------------------------------------------------------------- */
+
+static bool was_tried(const char *name, size_t length) {
+    for (size_t i = 0; i < all.count; ++i)
+        if (strlen(all.tried[i]) == length && strncmp(all.tried[i], name, length) == 0)
+            return true;
+    return false;
+}
+
+/* A declaration is "OVOID_API type name(", maybe in several lines. */
+static size_t check_header(const char *path) {
+    static char text[1 << 18];
+    size_t found = 0;
+    FILE *const file = fopen(path, "r");
+    assert_non_null(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    assert_true(strlen(text) < sizeof text - 1);
+    fclose(file);
+    for (const char *at = text; (at = strstr(at, "\nOVOID_API ")) != NULL; ++found) {
+        const char *const end = at += strcspn(at, "("), *begin = end;
+        while (isalnum((unsigned char)begin[-1]) || begin[-1] == '_')
+            --begin;
+        if (!was_tried(begin, (size_t)(end - begin)))
+            fail_msg("no test gives NULL to %.*s()", (int)(end - begin), begin);
+    }
+    return found;
+}
+
+/* tests/project/symbols.sh sees to it that what is declared is what is exported. */
+static void no_function_is_left_out(void **state) {
+    (void)state;
+    const size_t found =
+        check_header(OVOID_HEADERS "/ovoid.h") + check_header(OVOID_HEADERS "/surface.h");
+    print_message("%zu functions\n", found);
+    assert_true(found > 80);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(contexts_and_devices),
+        cmocka_unit_test(destroyers),
+        cmocka_unit_test(defaults),
+        cmocka_unit_test(without_pointers),
+        cmocka_unit_test(molecules),
+        cmocka_unit_test(files),
+        cmocka_unit_test(fields_and_models),
+        cmocka_unit_test(meshes),
+        cmocka_unit_test(exports_and_pictures),
+        cmocka_unit_test(no_function_is_left_out),
+    };
+    return cmocka_run_group_tests(tests, make_subject, drop_subject);
+}

@@ -9,24 +9,28 @@
 /* Merged at once: this share of the ellipsoids at most, and so far apart (angstrom) that each
  * merge's neighbours can make up for it. */
 #define SHARE 0.12
+#define SHARE_MIN 0.015
+#define TRIES_MIN 2
 #define APART 7.0
+#define ADAPT_REACH 10.0
 /* Of all pairs of neighbours, the cheapest: few of the others can merge. */
-#define PAIRS_PER_EFFORT 0.25
+#define PAIRS_PER_EFFORT 0.5
 /* A merge that was too much is not tried again: none within this (angstrom) of where it lay, */
 #define SAME_MERGE 1.0
-/* and a place is done where so many were too much. */
+/* and a place is left alone where so many were too much: at first few, so that all places have
+ * their turn, in the end so many per effort. */
 #define DONE_REACH 5.0
+#define DONE_FIRST 2
 #define DONE_PER_EFFORT 8
 /* Where the model is off after a round of merges, the nearest are taken back, in so many rounds,
  * and what is this near to a spot adapts to it; what is still off then grows. */
 #define BACK_ROUNDS 2
 #define BACK_REACH 8.0
 #define REGROW_ROUNDS 6
-/* Shrinking ends after so many rounds in a row that gained less than this share each, and so many
- * merges tried in them per effort. */
+/* Shrinking ends when so many rounds and tries per effort gained less than this share together. */
 #define GAIN 0.006
-#define IDLE_ROUNDS 2
-#define IDLE_TRIES 100
+#define IDLE_ROUNDS 5
+#define IDLE_TRIES 30
 
 /* A model that shrinks. */
 typedef struct shrinking {
@@ -34,16 +38,20 @@ typedef struct shrinking {
     uint32_t *parents;  /* as of ov_merge_cheapest(): in the best model */
     ov_places failed;   /* where merging was too much */
     ov_grid same, done; /* of these */
-    size_t limit;       /* failures until a place is done */
+    size_t limit, most; /* failures until a place is left alone, for now and for ever */
     bool *chosen;
     double *x; /* room for a model */
     uint32_t *more_parents;
-    size_t idle_rounds, idle_tries; /* lately */
+    double share;                   /* of the ellipsoids that are merged at once */
+    size_t milestone;               /* the last count that was a gain */
+    size_t idle_rounds, idle_tries; /* since */
 } shrinking;
 
 static ovoid_status shrinking_create(ov_adaptive *f, shrinking *s) {
     ovoid_status status = OVOID_OK;
-    *s = (shrinking){.limit = DONE_PER_EFFORT * (size_t)f->options->adaptive.effort};
+    *s = (shrinking){.share = SHARE,
+                     .limit = DONE_FIRST,
+                     .most = DONE_PER_EFFORT * (size_t)f->options->adaptive.effort};
     OV_TRY(ov_trial_create(f, &s->next));
     s->parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
     s->more_parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
@@ -97,7 +105,7 @@ cleanup:
 /* Merges what costs least of the best model, in many places at once. */
 static ovoid_status merge(ov_adaptive *f, const ov_trial *best, shrinking *s) {
     ovoid_status status = OVOID_OK;
-    const size_t fewer = (size_t)(SHARE * (double)best->count) + 1;
+    const size_t fewer = (size_t)fmax(s->share * (double)best->count, TRIES_MIN);
     const ov_merging merging = {.share = PAIRS_PER_EFFORT * f->options->adaptive.effort,
                                 .allowed = allowed,
                                 .user = s,
@@ -113,8 +121,6 @@ cleanup:
     return status;
 }
 
-/* ---- taking back ---------------------------------------------------------------------------- */
-
 static bool is_merged(const shrinking *s, size_t i) {
     return s->parents[2 * i + 1] != UINT32_MAX;
 }
@@ -122,6 +128,29 @@ static bool is_merged(const shrinking *s, size_t i) {
 static const double *centre_of(const double *x, size_t i) {
     return x + i * OV_FACTOR_PARAMETERS + OV_FACTOR_CENTRE;
 }
+
+static ovoid_status choose_near(ov_adaptive *f, const ov_spots *spots, double reach, shrinking *s) {
+    return ov_near_spots(f->context, spots, centre_of(s->next.x, 0),
+                         OV_FACTOR_PARAMETERS * sizeof(double), s->next.count, reach, s->chosen);
+}
+
+/* Lets what is near the merges make up for them. */
+static ovoid_status adapt(ov_adaptive *f, shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    ov_spots merged = {.spot = ov_alloc(f->context, s->next.count, sizeof *merged.spot, "merges")};
+    if (!merged.spot)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < s->next.count; ++i)
+        if (is_merged(s, i))
+            memcpy(merged.spot[merged.count++].at, centre_of(s->next.x, i), sizeof merged.spot->at);
+    OV_TRY(choose_near(f, &merged, ADAPT_REACH, s));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", OV_LOCAL_STEPS, s->chosen));
+cleanup:
+    ov_spots_destroy(&merged);
+    return status;
+}
+
+/* ---- taking back ---------------------------------------------------------------------------- */
 
 /* Chooses the merged ellipsoid that is nearest to each spot, wherever that is. */
 static void choose_nearest(const shrinking *s, const ov_spots *spots) {
@@ -196,9 +225,7 @@ static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spot
     choose_nearest(s, spots);
     OV_TRY(remember(f, best, s));
     take_back(best, s);
-    OV_TRY(ov_near_spots(f->context, spots, centre_of(s->next.x, 0),
-                         OV_FACTOR_PARAMETERS * sizeof(double), s->next.count, BACK_REACH,
-                         s->chosen));
+    OV_TRY(choose_near(f, spots, BACK_REACH, s));
     OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", OV_LOCAL_STEPS, s->chosen));
 cleanup:
     return status;
@@ -222,17 +249,25 @@ cleanup:
     return status;
 }
 
+/* Fewer at once where most were too much: each then has its neighbours to itself. */
+static void choose_share(shrinking *s, size_t tries, size_t held) {
+    if (4 * held < tries)
+        s->share = fmax(0.5 * s->share, SHARE_MIN);
+    else if (2 * held > tries)
+        s->share = fmin(2.0 * s->share, SHARE);
+}
+
 /* Whether the last rounds were worth their while: too little was gained in a few of them and in
  * enough tries, which in a small molecule take more rounds. */
-static bool is_idle(shrinking *s, size_t before, size_t tries, size_t after, uint32_t effort) {
-    if ((double)(before - after) > GAIN * (double)before) {
-        s->idle_rounds = 0;
-        s->idle_tries = 0;
-        return false;
-    }
+static bool is_idle(shrinking *s, size_t tries, size_t count, uint32_t effort) {
     ++s->idle_rounds;
     s->idle_tries += tries;
-    return s->idle_rounds >= IDLE_ROUNDS && s->idle_tries >= (size_t)effort * IDLE_TRIES;
+    if ((double)count <= (1.0 - GAIN) * (double)s->milestone) {
+        s->milestone = count;
+        s->idle_rounds = 0;
+        s->idle_tries = 0;
+    }
+    return s->idle_rounds >= IDLE_ROUNDS * effort && s->idle_tries >= IDLE_TRIES * effort;
 }
 
 ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
@@ -240,17 +275,23 @@ ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best
     shrinking s;
     bool idle = false;
     OV_TRY(shrinking_create(f, &s));
+    s.milestone = best->count;
     while (!idle && best->count > 1) {
         const size_t before = best->count;
         OV_TRY(merge(f, best, &s));
         const size_t tries = before - s.next.count;
-        if (tries == 0)
+        if (tries == 0 && s.limit >= s.most)
             break;
-        OV_TRY(ov_adaptive_refine(f, &s.next, "shrink", OV_LOCAL_STEPS, 1e-1, 1e-5));
+        if (tries == 0) {
+            s.limit *= 2; /* another turn for each place */
+            continue;
+        }
+        OV_TRY(adapt(f, &s));
         OV_TRY(settle(f, tolerance, best, &s));
         if (s.next.count < before && ov_trial_holds(&s.next, tolerance))
             ov_trial_swap(&s.next, best);
-        idle = is_idle(&s, before, tries, best->count, f->options->adaptive.effort);
+        choose_share(&s, tries, before - best->count);
+        idle = is_idle(&s, tries, best->count, f->options->adaptive.effort);
     }
 cleanup:
     shrinking_destroy(&s);

@@ -9,6 +9,11 @@
 #define RATIO_AT_ONE 0.04
 #define RATIO_POWER -0.95
 #define RATIO_DECAY 1.25
+/* Where so many spots per ellipsoid are off, the surface is rougher than that, as without
+ * hydrogens, and merging the atoms to so many times as many is better than splitting most
+ * ellipsoids. */
+#define TOO_MANY 0.3
+#define AGAIN 1.35
 /* How far spots are apart (angstrom). */
 #define SPOTS_APART 3.0
 /* The weight of points about a spot, each time it is met. */
@@ -49,9 +54,16 @@ static ovoid_status start_and_grow(ov_adaptive *f, double tolerance, ov_trial *t
     const ov_growing how = {.stage = "grow", .most = f->atoms, .rounds = GROW_ROUNDS};
     const double guess = RATIO_AT_ONE * pow(tolerance, RATIO_POWER) *
                          pow(f->options->decay / 0.5, RATIO_DECAY) * (double)f->atoms;
-    const size_t count = (size_t)fmin(fmax(round(guess), 1.0), (double)f->atoms);
-    OV_TRY(ov_adaptive_begin(f, 0, f->options->adaptive.effort > 1 ? 3 : 1, count, t));
-    OV_TRY(ov_adaptive_spots(f, t, tolerance, SIZE_MAX, &spots));
+    double count = fmin(fmax(round(guess), 1.0), (double)f->atoms);
+    const size_t kinds = f->options->adaptive.effort > 1 ? 3 : 1;
+    OV_TRY(ov_adaptive_begin(f, 0, kinds, (size_t)count, t));
+    OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
+    while (f->options->adaptive.steps > 0 && (double)spots.count > TOO_MANY * count &&
+           count < (double)f->atoms) {
+        count = fmin(ceil(AGAIN * count), (double)f->atoms);
+        OV_TRY(ov_adaptive_begin(f, 0, kinds, (size_t)count, t));
+        OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
+    }
     if (f->options->adaptive.steps > 0)
         OV_TRY(ov_adaptive_grow(f, tolerance, &how, t, &spots));
 cleanup:

@@ -15,8 +15,7 @@
  *   function hands out as a pointer to const belongs to the object it came from.
  * - NULL, where it has no meaning of its own: a function that returns a status returns
  *   OVOID_ERROR_ARGUMENT and names the argument; one that answers a question answers 0, NULL, NAN
- * or
- *   "", as if of nothing; all others, such as xxx_options_init(), do nothing.
+ *   or "", as if of nothing; all others, such as xxx_options_init(), do nothing.
  * - The library prints nothing, never exits, installs no signal handler and does not touch the
  *   environment (but see ovoid_prepare_process()).
  * - A context and what is made with it may be used by one thread at a time; different contexts are

@@ -397,6 +397,7 @@ static ovoid_status read_text(ov_reader *reader, ovoid_molecule_format format) {
     reader->molecule->format = format;
     warn_of_ignored(reader);
     status = ov_assembly_finish(reader);
+    ov_sites_count(reader->molecule);
     return status == OVOID_OK ? ov_radii_assign(reader) : status;
 }
 

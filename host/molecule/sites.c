@@ -432,8 +432,8 @@ cleanup:
     return status;
 }
 
-static void count_atoms(ovoid_molecule *m) {
-    for (size_t i = 0; i < m->atoms; i++) {
+void ov_sites_count(ovoid_molecule *m) {
+    for (size_t i = 0; m->identity && i < m->atoms; i++) {
         m->counts.zero_occupancy += (m->identity[i].flags & OVOID_ATOM_ZERO_OCCUPANCY) != 0;
         m->counts.hydrogens += is_hydrogen(ov_element_find(m->identity[i].element));
     }
@@ -445,7 +445,6 @@ ovoid_status ov_sites_finish(ov_reader *reader) {
         ovoid_status status = decide(reader);
         if (status != OVOID_OK)
             return status;
-        count_atoms(m);
     }
     if (m->counts.models == 0)
         m->counts.models = 1;

@@ -89,4 +89,7 @@ void ov_sites_compact(struct ov_reader *reader, const unsigned char *keep);
 /* Selects, resolves alternate locations, and counts. There may be no atom left. */
 ovoid_status ov_sites_finish(struct ov_reader *reader);
 
+/* Counts the kinds of the atoms that are left, once nothing more is left out. */
+void ov_sites_count(ovoid_molecule *molecule);
+
 #endif

@@ -470,7 +470,6 @@ static void samples_of_a_wide_structure(void **state) {
 static void lists_of_samples_need_little_room(void **state) {
     enum { MANY = 2500 };
     const ov_band band = {.low = 1e-3, .high = 1e30};
-    double *const xyzr = test_alloc(4 * MANY, sizeof *xyzr);
     test_random random = {71};
     ovoid_context *context = NULL;
     ov_device *device = NULL;
@@ -481,6 +480,7 @@ static void lists_of_samples_need_little_room(void **state) {
     test_skip_simulated(*state);
     if (test_small())
         skip();
+    double *const xyzr = test_alloc(4 * MANY, sizeof *xyzr);
     assert_int_equal(ovoid_context_create(&context), OVOID_OK);
     test_check(context, ovoid_context_open_device(context, NULL));
     test_check(context, ov_device_get(context, &device));

@@ -11,6 +11,7 @@
  * cut-off. Each time is the least of several repeats; run nothing else beside it.
  */
 #include "field/field.h"
+#include "model/ellipsoid.h"
 
 #include <math.h>
 #include <stdio.h>

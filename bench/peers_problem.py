@@ -1,7 +1,7 @@
 """The adaptive method's problem once more, in numpy: what peers.py minimises.
 
-The points and what is asked for there are those of host/fit/target.c and the lattice that
-host/fit/adaptive.c lays; the constants below have to follow the ones there. Lengths in angstrom.
+The points and what is asked for there are those of host/fit/adaptive/target.c and the lattice that
+host/fit/adaptive/adaptive.c lays; the constants below have to follow the ones there. Lengths in angstrom.
 """
 
 import collections

@@ -12,7 +12,7 @@ the ellipsoids' coefficients.
 import numpy
 import torch
 
-CUTOFF = 1e-4  # of an ellipsoid's value at a block, as in host/fit/refine.c
+CUTOFF = 1e-4  # of an ellipsoid's value at a block, as in host/fit/adaptive/refine.c
 SKIN = 1.0  # angstrom by which reaches are enlarged, so that lists last for some steps
 EMPTY = -1e4  # exponent of what only fills up a list
 

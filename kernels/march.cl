@@ -9,7 +9,7 @@
  * A vertex lies on each edge whose ends differ in sign. `crossing` holds four values per brick: the
  * number of its first vertex, and the masks of its crossed edges along x, y and z. Its vertices are
  * numbered in that order, by point within each axis, so that any vertex's number follows from its
- * edge. Edges are named as in host/surface/case_table.h: corner + 8 * axis.
+ * edge. Edges are named as in host/mesh/case_table.h: corner + 8 * axis.
  *
  * The values of phi lie elsewhere: those of a brick in pack place[brick].
  *
@@ -166,7 +166,7 @@ static inline spot move_to_corner(uint brick, uint point, uint corner, uint nx, 
  * through a lattice point, all its edges have their vertex there, and programs that merge equal
  * vertices would be left with triangles without area and holes. Three points within three edges of
  * a box are never on one line, so that apart from these ends no triangle can lose its area. */
-#define EDGE_MARGIN 7.62939453125e-6f /* 2^-17, as in host/surface/march.h */
+#define EDGE_MARGIN 7.62939453125e-6f /* 2^-17, as in host/mesh/march.h */
 
 static inline float keep_within(float t) {
     return clamp(t, EDGE_MARGIN, 1.0f - EDGE_MARGIN);

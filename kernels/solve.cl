@@ -6,7 +6,7 @@
  * The ten parameters of an ellipsoid are ln a, the centre, and L = (l11, l21, l31, l22, l32, l33)
  * with A = L L^T. With z = y - centre every derivative of e is e times a polynomial of degree 2 in
  * z: "to_polynomial" maps a direction of the parameters to its ten coefficients, "to_parameters" is
- * the transpose, from moments to parameters. (fit/factor.h has them in double.)
+ * the transpose, from moments to parameters. (model/factor.h has them in double.)
  *
  * One work-item per ellipsoid in groups of OV_SOLVE_GROUP. Dot products: each group leaves one
  * partial sum, the next kernel's groups add them up, all in one order.

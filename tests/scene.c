@@ -1,4 +1,5 @@
 #include "scene.h"
+#include "model/ellipsoid.h"
 
 static bool wanted(const scene *s, const int64_t at[3], double phi) {
     const ov_target_options *const options = &s->target.options;

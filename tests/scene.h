@@ -5,8 +5,8 @@
 #ifndef SCENE_H
 #define SCENE_H
 
-#include "fit/factor.h"
-#include "fit/target.h"
+#include "fit/adaptive/target.h"
+#include "model/factor.h"
 #include "support.h"
 
 typedef struct scene {

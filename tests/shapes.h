@@ -4,7 +4,7 @@
 #ifndef SHAPES_H
 #define SHAPES_H
 
-#include "surface/mesh.h"
+#include "mesh/mesh.h"
 
 /* Arrays of a mesh under construction: shapes are appended to one another. Starts as {0}. */
 typedef struct shape {

@@ -1,4 +1,5 @@
 #include "support.h"
+#include "model/ellipsoid.h"
 
 bool test_small(void) {
     const char *const text = getenv("OVOID_TEST_SMALL");

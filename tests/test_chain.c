@@ -2,7 +2,7 @@
  * The chain rule from moments to the ten parameters of the paper's model, held to central
  * differences of the paper's own formula in double.
  */
-#include "fit/chain.h"
+#include "model/chain.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

@@ -1,10 +1,10 @@
 /*
  * Distances between meshes, against closed forms and against every triangle in double precision.
  */
+#include "measure/distance.h"
 #include "reference/distance.h"
 #include "shapes.h"
 #include "support.h"
-#include "surface/distance.h"
 
 static ovoid_distances distances(ovoid_context *context, const shape *a, const shape *b,
                                  bool outer_only) {

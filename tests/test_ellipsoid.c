@@ -1,4 +1,5 @@
 /* One ellipsoid on the host: the paper's rotation, its derivatives, the quadratic form, atoms. */
+#include "model/ellipsoid.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

@@ -2,7 +2,8 @@
  * The adaptive method's parameters and what they are made from and become: quadratic forms and the
  * paper's ellipsoids; and the bound on how far a cut-off ellipsoid moves.
  */
-#include "fit/factor.h"
+#include "model/ellipsoid.h"
+#include "model/factor.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

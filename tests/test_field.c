@@ -5,6 +5,7 @@
  * Tolerances are multiples of FLT_EPSILON times the conditioning that the twins report
  * (reference_sum): about one rounding of each exponent and one of each part of a sum.
  */
+#include "model/ellipsoid.h"
 #include "support.h"
 
 /* About twice what is measured on PoCL, in all shapes. */

@@ -2,6 +2,7 @@
  * The kernel gram against its twin in double, against the quadratic form of field_polynomial, and
  * against Gaussian integrals. Tolerances: see test_field.c.
  */
+#include "model/ellipsoid.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

@@ -1,7 +1,7 @@
 /*
  * Judging models by their surfaces: spheres, whose areas, volumes and distances are known.
  */
-#include "fit/judge.h"
+#include "measure/judge.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

@@ -2,7 +2,7 @@
  * The paper's objective on the device: its lists follow moving ellipsoids, its gradient is that of
  * w_s E_s + w_l E_l1.
  */
-#include "fit/l1_objective.h"
+#include "fit/l1/objective.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

@@ -1,6 +1,7 @@
 /*
  * The two lists that pair terms with packs, against the exact least exponent over every pack's box.
  */
+#include "model/ellipsoid.h"
 #include "support.h"
 
 /* The lists, on the host. */

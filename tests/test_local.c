@@ -2,7 +2,7 @@
  * The accuracy step of some ellipsoids: the others keep their bits, the misfit of the whole falls
  * by what that of the part does, and the points left out do not matter.
  */
-#include "fit/local.h"
+#include "fit/adaptive/local.h"
 #include "scene.h"
 
 enum { P = OV_FACTOR_PARAMETERS };

@@ -2,6 +2,7 @@
  * Density maps: MRC2014 and OpenDX files are read by readers written from the formats' documents,
  * and by gemmi and PyMOL where those are installed; their values are those of the reference.
  */
+#include "model/ellipsoid.h"
 #include "ovoid/surface.h"
 #include "scratch.h"
 #include "support.h"

@@ -6,11 +6,12 @@
 
 #include <unistd.h>
 
-#include "fit/model.h"
+#include "mesh/case_table.h"
+#include "mesh/march.h"
+#include "mesh/mesh.h"
+#include "model/ellipsoid.h"
+#include "model/model.h"
 #include "reference/march.h"
-#include "surface/case_table.h"
-#include "surface/march.h"
-#include "surface/mesh.h"
 
 #define PI 3.14159265358979323846
 #define APBS_FAS2 "/usr/share/apbs/examples/misc/fas2.pqr"

@@ -2,9 +2,9 @@
  * Measures of molecules and models: closed forms of one atom and one ellipsoid, what measures say
  * of surfaces with cavities, and the paper's Table 2.
  */
+#include "measure/measure.h"
 #include "shapes.h"
 #include "support.h"
-#include "surface/measure.h"
 
 #define PI 3.14159265358979323846
 

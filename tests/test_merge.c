@@ -2,8 +2,9 @@
  * Merges and splits of a refined model: the kernel merge_loss against a twin that evaluates every
  * point, and what ov_merge_cheapest(), ov_split_worst() and ov_misfit_shares() do to a model.
  */
-#include "fit/merge.h"
-#include "fit/reduce_component.h"
+#include "fit/adaptive/merge.h"
+#include "mixture/component.h"
+#include "model/ellipsoid.h"
 #include "support.h"
 
 enum { P = OV_FACTOR_PARAMETERS };

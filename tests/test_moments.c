@@ -2,6 +2,7 @@
  * The kernels moments and residual against their twins in double, and the moments of a fine lattice
  * against Gaussian integrals. Tolerances: see test_field.c.
  */
+#include "model/ellipsoid.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

@@ -1,7 +1,7 @@
 /*
- * Who owns which atom after splits and merges (host/fit/owner.h), by hand.
+ * Who owns which atom after splits and merges (host/model/owner.h), by hand.
  */
-#include "fit/owner.h"
+#include "model/owner.h"
 #include "support.h"
 
 static ov_quadric sphere(double x, double amplitude, double decay) {

@@ -1,9 +1,9 @@
 /*
- * The search's account by place (host/fit/places.h), and going back to atoms here and there
- * (ov_adaptive_rebuild(), host/fit/rebuild.c), by hand.
+ * The search's account by place (host/fit/adaptive/places.h), and going back to atoms here and
+ * there (ov_adaptive_rebuild(), host/fit/adaptive/rebuild.c), by hand.
  */
-#include "fit/adaptive_parts.h"
-#include "fit/places.h"
+#include "fit/adaptive/parts.h"
+#include "fit/adaptive/places.h"
 #include "support.h"
 
 /* ---- places ------------------------------------------------------------------------------- */

@@ -1,8 +1,9 @@
 /* Mixture reduction: what merges keep, what they cost, which come first, and the cuts. */
-#include "fit/reduce.h"
-#include "fit/reduce_cells.h"
-#include "fit/reduce_component.h"
-#include "fit/reduce_field.h"
+#include "mixture/component.h"
+#include "mixture/reduce.h"
+#include "mixture/start_field.h"
+#include "model/ellipsoid.h"
+#include "neighbours/neighbours.h"
 #include "support.h"
 
 #define PI 3.14159265358979323846

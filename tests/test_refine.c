@@ -2,7 +2,7 @@
  * The accuracy step: known mixtures are found again, the misfit never rises, what is rejected
  * leaves no trace, and lists that ellipsoids moved in hold all that matters.
  */
-#include "fit/refine.h"
+#include "fit/adaptive/refine.h"
 #include "scene.h"
 
 enum { P = OV_FACTOR_PARAMETERS };

@@ -1,14 +1,15 @@
 /* Pictures: rays against closed forms and the reference, light, whole pictures, PNG files. */
 #include "support.h"
 
+#include "model/ellipsoid.h"
+#include "picture/camera.h"
+#include "picture/colour_bar.h"
+#include "picture/image.h"
+#include "picture/label.h"
+#include "picture/palette.h"
+#include "picture/rays.h"
+#include "picture/render.h"
 #include "reference/render.h"
-#include "surface/camera.h"
-#include "surface/colour_bar.h"
-#include "surface/image.h"
-#include "surface/label.h"
-#include "surface/palette.h"
-#include "surface/rays.h"
-#include "surface/render.h"
 
 #include <png.h>
 #include <unistd.h>

@@ -2,7 +2,8 @@
  * The solver of the adaptive fit: the maps between parameters and polynomials, the blocks of the
  * preconditioner, and whole solutions against a dense system in double.
  */
-#include "fit/solver.h"
+#include "fit/adaptive/solver.h"
+#include "model/ellipsoid.h"
 #include "reference/factor.h"
 #include "support.h"
 

@@ -2,10 +2,10 @@
  * Radii that stand for missing hydrogens: the facts against chemistry written down independently,
  * the guesses by shape on ideal geometry and on a protein, and that protein's surface.
  */
+#include "measure/measure.h"
 #include "molecule/united.h"
 #include "molecule/united_table.h"
 #include "support.h"
-#include "surface/measure.h"
 
 /* ---- known residues ----------------------------------------------------------------------- */
 

@@ -9,7 +9,7 @@
 #define OV_FIELD_H
 
 #include "device/device.h"
-#include "field/ellipsoid.h"
+#include "field/quadric.h"
 #include "shared.h"
 
 /* The float next to x, for what is then to be subtracted from x. Through memory, since GCC 12 drops

@@ -1,8 +1,8 @@
 #include "base/progress.h"
-#include "fit/adaptive.h"
-#include "fit/l1.h"
-#include "fit/model.h"
+#include "fit/adaptive/adaptive.h"
+#include "fit/l1/l1.h"
 #include "fit/options.h"
+#include "model/model.h"
 
 #include <math.h>
 #include <stdlib.h>

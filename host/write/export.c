@@ -3,6 +3,7 @@
 #include "base/file.h"
 #include "base/progress.h"
 #include "field/field.h"
+#include "model/ellipsoid.h"
 #include "write/text.h"
 
 #include <math.h>

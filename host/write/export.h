@@ -8,7 +8,7 @@
 #define OV_EXPORT_H
 
 #include "base/base.h"
-#include "field/ellipsoid.h"
+#include "field/quadric.h"
 #include "ovoid/surface.h"
 
 #include <stdio.h>

@@ -11,6 +11,7 @@
 #include "write/export.h"
 
 #include "base/progress.h"
+#include "model/ellipsoid.h"
 
 #include <math.h>
 

@@ -1,8 +1,8 @@
 /* Coordinates in single precision, for the formats that have no other. */
 #include "write/mesh_file.h"
 
-#include "surface/march.h"
-#include "surface/mesh.h"
+#include "mesh/march.h"
+#include "mesh/mesh.h"
 
 #include <float.h>
 #include <math.h>

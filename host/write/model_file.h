@@ -14,7 +14,7 @@
 #ifndef OV_MODEL_FILE_H
 #define OV_MODEL_FILE_H
 
-#include "fit/model.h"
+#include "model/model.h"
 
 #define OV_MODEL_FILE_MAGIC "ovoid model"
 #define OV_MODEL_FILE_VERSION 1

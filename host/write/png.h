@@ -4,7 +4,7 @@
 #ifndef OV_PNG_H
 #define OV_PNG_H
 
-#include "surface/image.h"
+#include "picture/image.h"
 
 #include <stdio.h>
 

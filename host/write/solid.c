@@ -1,3 +1,4 @@
+#include "model/ellipsoid.h"
 #include "write/export.h"
 
 #include <math.h>

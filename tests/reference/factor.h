@@ -5,7 +5,7 @@
 #ifndef REFERENCE_FACTOR_H
 #define REFERENCE_FACTOR_H
 
-#include "fit/factor.h"
+#include "model/factor.h"
 #include "reference/reference.h"
 
 /* exp(ln a - |L^T (y - centre)|^2) */

@@ -1,6 +1,6 @@
 #include "reference/march.h"
 
-#include "surface/case_table.h"
+#include "mesh/case_table.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -52,7 +52,7 @@ double reference_least_exponent(const ov_quadric *quadric, const double box[6]);
 double reference_phi(const double *xyzr, size_t atoms, double decay, const double y[3]);
 
 /* sum_k (phi~(y_k) - target_k)^2 for the paper's parameters, ten per ellipsoid in the order of
- * fit/chain.h. */
+ * model/chain.h. */
 double reference_accuracy(const double *parameters, size_t ellipsoids, const double *xyz,
                           const double *target, size_t points, double limit);
 

@@ -5,7 +5,7 @@
 #ifndef REFERENCE_RENDER_H
 #define REFERENCE_RENDER_H
 
-#include "field/ellipsoid.h"
+#include "field/quadric.h"
 
 #include <stddef.h>
 

@@ -1,0 +1,89 @@
+#include "fit/adaptive/parts.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Repairs: the share of ellipsoids that is split and merged back at first, and how many rounds. */
+#define REPAIR_SHARE 0.08
+#define REPAIRS_PER_EFFORT 4
+
+/* Splits where the misfit is largest, and merges as many elsewhere. */
+static ovoid_status repair_once(ov_adaptive *f, const ov_trial *from, size_t skip, size_t more,
+                                ov_trial *to) {
+    ovoid_status status = OVOID_OK;
+    double misfit;
+    size_t split;
+    const ov_merging merging = {.twin = f->twin, .parents = f->parents};
+    ov_trial_copy(from, to);
+    OV_TRY(ov_refine_evaluate(&f->refiner, &f->target, to->x, to->count, &misfit));
+    OV_TRY(ov_split_worst(&f->refiner, &f->merger, &f->target, to->x, &to->count, skip, more,
+                          f->twin));
+    OV_TRY(ov_adaptive_refine_quickly(f, to, "repair"));
+    OV_TRY(ov_adaptive_share_atoms(f, to));
+    split = to->count;
+    OV_TRY(
+        ov_merge_cheapest(&f->refiner, &f->merger, &f->target, to->x, &to->count, more, &merging));
+    OV_TRY(
+        ov_owner_merge(f->context, f->parents, to->count, split, to->owner, f->atoms, to->owner));
+    OV_TRY(ov_adaptive_refine_fully(f, to, "repair"));
+    OV_TRY(ov_adaptive_judge(f, to));
+cleanup:
+    return status;
+}
+
+static ovoid_status repair(ov_adaptive *f, ov_trial *best, uint32_t rounds) {
+    ovoid_status status = OVOID_OK;
+    ov_trial other = {0};
+    double share = REPAIR_SHARE;
+    size_t skip = 0;
+    OV_TRY(ov_trial_create(f, &other));
+    for (uint32_t n = 0; n < rounds && best->count > 1 && skip < best->count; ++n) {
+        const size_t most = f->capacity - best->count;
+        size_t more = (size_t)(share * (double)best->count);
+        more = more < 1 ? 1 : more;
+        OV_TRY(repair_once(f, best, skip, more < most ? more : most, &other));
+        if (other.count == best->count && other.judgement.score < best->judgement.score) {
+            ov_trial_swap(&other, best);
+            skip = 0;
+        } else if (more > 1) {
+            share *= 0.5;
+        } else {
+            ++skip;
+        }
+    }
+cleanup:
+    ov_trial_destroy(&other);
+    return status;
+}
+
+/* From the starts to the last repair, under one window. */
+static ovoid_status fit_window(ov_adaptive *f, size_t count, size_t window, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    const uint32_t effort = f->options->adaptive.effort;
+    const size_t kinds = 2 * (size_t)effort - 1 < OV_STARTS ? 2 * (size_t)effort - 1 : OV_STARTS;
+    OV_TRY(ov_adaptive_begin(f, window, kinds, count, best));
+    if (effort == 1)
+        goto cleanup;
+    OV_TRY(ov_adaptive_judge(f, best));
+    OV_TRY(repair(f, best, REPAIRS_PER_EFFORT * (effort - 1)));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    ov_trial other = {0};
+    OV_TRY(fit_window(f, count, 0, best));
+    if (f->options->adaptive.effort == 1)
+        goto cleanup;
+    OV_TRY(ov_trial_create(f, &other));
+    for (size_t window = 1; window < OV_WINDOWS; ++window) {
+        OV_TRY(fit_window(f, count, window, &other));
+        if (other.judgement.score < best->judgement.score)
+            ov_trial_swap(&other, best);
+    }
+cleanup:
+    ov_trial_destroy(&other);
+    return status;
+}

@@ -1,0 +1,102 @@
+/*
+ * What the goals of the adaptive method have in common (see adaptive.h): a fit with its trials, and
+ * the steps they are made of. Progress is reported on the way; OVOID_ERROR_CANCELLED when the
+ * caller has had enough.
+ */
+#ifndef OV_ADAPTIVE_PARTS_H
+#define OV_ADAPTIVE_PARTS_H
+
+#include "fit/adaptive/adaptive.h"
+
+#include "fit/adaptive/local.h"
+#include "fit/adaptive/merge.h"
+#include "fit/adaptive/refine.h"
+#include "measure/judge.h"
+#include "mixture/reduce.h"
+#include "model/owner.h"
+
+/* Ways to merge, and windows about the surface. */
+enum { OV_STARTS = 6, OV_WINDOWS = 3 };
+
+typedef struct ov_adaptive {
+    ovoid_context *context;
+    const double *xyzr;
+    size_t atoms;
+    const ovoid_fit_options *options;
+    ov_samples samples;
+    ov_target target;
+    ov_reduction *reduction[OV_STARTS];
+    ov_refiner refiner;
+    ov_local local;
+    ov_merger merger;
+    ov_judge judge;
+    double spacing; /* of the points */
+    const char *stage;
+    uint64_t steps; /* refinement steps so far */
+    size_t count;   /* ellipsoids being worked on */
+    double misfit;
+    size_t capacity; /* ellipsoids that the arrays below hold */
+    ov_quadric *quadrics;
+    uint32_t *twin;    /* of halves, as of ov_split_worst() */
+    uint32_t *parents; /* of merges, as of ov_merging */
+} ov_adaptive;
+
+/* A model with what is known of it. */
+typedef struct ov_trial {
+    double *x; /* room for capacity ellipsoids */
+    size_t count;
+    uint32_t *owner; /* of each atom: the ellipsoid that it is part of */
+    size_t atoms;
+    double misfit;
+    ov_judgement judgement;
+} ov_trial;
+
+/* Tells the caller where an ov_adaptive is; false: the caller has had enough. */
+bool ov_adaptive_report(void *fit);
+
+ovoid_status ov_trial_create(const ov_adaptive *f, ov_trial *t);
+void ov_trial_destroy(ov_trial *t);
+void ov_trial_copy(const ov_trial *from, ov_trial *to);
+void ov_trial_swap(ov_trial *a, ov_trial *b);
+
+/* Fills f->quadrics with the trial's ellipsoids. */
+void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t);
+
+/* At most `steps` of them, until one gains less than the share `decrease`; tolerance: of the
+ * solver. */
+ovoid_status ov_adaptive_refine(ov_adaptive *f, ov_trial *t, const char *stage, uint32_t steps,
+                                double tolerance, double decrease);
+ovoid_status ov_adaptive_refine_fully(ov_adaptive *f, ov_trial *t, const char *stage);
+ovoid_status ov_adaptive_refine_quickly(ov_adaptive *f, ov_trial *t, const char *stage);
+/* Refines the chosen ellipsoids alone, unless they are most of them; t->misfit stays as it is. */
+ovoid_status ov_adaptive_refine_some(ov_adaptive *f, ov_trial *t, const char *stage, uint32_t steps,
+                                     const bool *chosen);
+
+/* After splits, and best once the halves have been refined: shares out the atoms of each ellipsoid
+ * that was split between it and its f->twin. */
+ovoid_status ov_adaptive_share_atoms(ov_adaptive *f, ov_trial *t);
+
+ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t);
+
+/* The merged atoms of start `kind` at this count. */
+ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial *t);
+/* How atoms merge at the first start. */
+const ov_reduction_options *ov_adaptive_merging(void);
+/* Goes back to the atoms of the chosen ellipsoids and merges these anew to `factor` times as many
+ * ellipsoids, the atoms themselves at most, in place of the chosen; all stays as it is where the
+ * chosen have no atoms. */
+ovoid_status ov_adaptive_rebuild(ov_adaptive *f, ov_trial *t, double factor, const bool *chosen);
+void ov_adaptive_drop_reductions(ov_adaptive *f);
+/* Refined from the first `kinds` starts, under one window, and with the right volume but for a
+ * little. */
+ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size_t count,
+                               ov_trial *best);
+
+/* ---- goals ---------------------------------------------------------------------------------- */
+
+/* The best model of so many ellipsoids. */
+ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best);
+/* The fewest ellipsoids with a deviation of at most `tolerance` angstrom, or the best there is. */
+ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best);
+
+#endif

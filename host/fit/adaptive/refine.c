@@ -1,0 +1,265 @@
+#include "fit/adaptive/refine.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* How far (angstrom) a cut-off ellipsoid may move before the lists are rebuilt: at first, and later
+ * SKIN_GROWTH times what it moved before, within bounds. */
+#define SKIN 0.3
+#define SKIN_GROWTH 1.5
+#define SKIN_MIN 0.1
+#define SKIN_MAX 1.5
+/* Bounds of one step of one ellipsoid, beyond which its quadratic model means nothing: of the
+ * centre (angstrom), of ln a, and of L relative to itself. */
+#define CENTRE_STEP 1.0
+#define AMPLITUDE_STEP 1.0
+#define FACTOR_STEP 0.5
+/* lambda: how it falls after two successes in a row and rises after a failure. */
+#define DAMPING_DOWN 0.5
+#define DAMPING_UP 4.0
+#define DAMPING_MIN 1e-7
+#define DAMPING_MAX 1e4
+
+static ovoid_status make_room(ov_refiner *r, size_t count) {
+    if (count <= r->capacity)
+        return OVOID_OK;
+    free(r->trial);
+    free(r->step);
+    free(r->quadrics);
+    r->trial = ov_alloc(r->context, count * OV_FACTOR_PARAMETERS, sizeof *r->trial, "parameters");
+    r->step = ov_alloc(r->context, count * OV_FACTOR_PARAMETERS, sizeof *r->step, "parameters");
+    r->quadrics = ov_alloc(r->context, count, sizeof *r->quadrics, "ellipsoids");
+    r->capacity = r->trial && r->step && r->quadrics ? count : 0;
+    return r->capacity ? OVOID_OK : OVOID_ERROR_MEMORY;
+}
+
+static double motion(const ov_evaluation *e, const double *x, size_t i) {
+    return ov_factor_motion(e->listed + i * OV_FACTOR_PARAMETERS, x + i * OV_FACTOR_PARAMETERS,
+                            OV_REFINE_CUTOFF);
+}
+
+static bool lists_cover(const ov_evaluation *e, const ov_points *points, const double *x,
+                        size_t count) {
+    if (e->listed_points != points || e->listed_count != count)
+        return false;
+    for (size_t i = 0; i < count; ++i)
+        if (motion(e, x, i) > e->skins[i])
+            return false;
+    return true;
+}
+
+/* Those that move much get much room, so that few of them do not make all lists be built again. */
+static void choose_skins(ov_evaluation *e, const double *x, size_t count) {
+    for (size_t i = 0; i < count; ++i)
+        e->skins[i] = e->listed_count == count
+                          ? (float)fmin(fmax(SKIN_GROWTH * motion(e, x, i), SKIN_MIN), SKIN_MAX)
+                          : (float)SKIN;
+}
+
+static ovoid_status set_terms(ov_refiner *r, ov_evaluation *e, const ov_points *points,
+                              const double *x, size_t count) {
+    for (size_t i = 0; i < count; ++i)
+        ov_factor_quadric(x + i * OV_FACTOR_PARAMETERS, &r->quadrics[i]);
+    return ov_terms_set_skins(r->context, &e->terms, r->quadrics, e->skins, count, points->origin,
+                              OV_REFINE_CUTOFF);
+}
+
+/* Sets the terms, and builds the lists again if they do not cover them any more. */
+static ovoid_status place(ov_refiner *r, ov_evaluation *e, const ov_points *points, const double *x,
+                          size_t count) {
+    ovoid_status status = OVOID_OK;
+    const size_t size = count * OV_FACTOR_PARAMETERS;
+    const bool covered = lists_cover(e, points, x, count);
+    OV_TRY(ov_grow(r->context, &e->listed, &e->listed_capacity, size, sizeof *x, "parameters"));
+    OV_TRY(ov_grow(r->context, &e->skins, &e->skins_capacity, count, sizeof *e->skins, "skins"));
+    if (!covered)
+        choose_skins(e, x, count);
+    if (!covered)
+        e->listed_count = 0; /* until the lists are whole again */
+    OV_TRY(set_terms(r, e, points, x, count));
+    if (covered)
+        return OVOID_OK;
+    OV_TRY(ov_lists_build(r->context, &e->lists, points, &e->terms, 0.0));
+    memcpy(e->listed, x, size * sizeof *x);
+    e->listed_count = count;
+    e->listed_points = points;
+    ++r->list_builds;
+cleanup:
+    return status;
+}
+
+static ovoid_status launch_misfit(ov_refiner *r, ov_evaluation *e, const ov_target *target) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint packs = (cl_uint)target->points->packs;
+    const size_t bytes = packs * (size_t)OV_PACK * sizeof(cl_float);
+    ov_device *device;
+    OV_TRY(ov_device_get(r->context, &device));
+    if (!r->misfit.handle)
+        OV_TRY(ov_kernel_create(r->context, "misfit", "misfit", &r->misfit));
+    OV_TRY(ov_buffer_reserve(r->context, &e->u, bytes, "residuals"));
+    OV_TRY(ov_buffer_reserve(r->context, &e->active, bytes, "weights"));
+    OV_TRY(ov_buffer_reserve(r->context, &e->sums, packs * sizeof(cl_float), "pack sums"));
+    OV_TRY(OV_LAUNCH(r->context, &r->misfit, packs, ov_item_group(device), OV_ARG(packs),
+                     OV_ARG(e->value.memory), OV_ARG(target->low.memory),
+                     OV_ARG(target->high.memory), OV_ARG(target->weight.memory),
+                     OV_ARG(e->u.memory), OV_ARG(e->active.memory), OV_ARG(e->sums.memory)));
+cleanup:
+    return status;
+}
+
+static ovoid_status evaluate(ov_refiner *r, ov_evaluation *e, const ov_target *target,
+                             const double *x, size_t count, double *misfit) {
+    ovoid_status status = OVOID_OK;
+    const ov_points *const points = target->points;
+    OV_TRY(make_room(r, count));
+    OV_TRY(place(r, e, points, x, count));
+    OV_TRY(ov_field(r->context, &r->operations, points, &e->terms, &e->lists, &e->value));
+    OV_TRY(launch_misfit(r, e, target));
+    OV_TRY(ov_grow(r->context, &r->host, &r->host_capacity, points->packs, sizeof *r->host,
+                   "pack sums"));
+    OV_TRY(ov_buffer_read(r->context, &e->sums, 0, r->host, points->packs * sizeof *r->host));
+    *misfit = 0.0;
+    for (size_t pack = 0; pack < points->packs; ++pack)
+        *misfit += r->host[pack];
+    ++r->evaluations;
+cleanup:
+    return status;
+}
+
+ovoid_status ov_refine_evaluate(ov_refiner *r, const ov_target *target, const double *x,
+                                size_t count, double *misfit) {
+    return evaluate(r, &r->now, target, x, count, misfit);
+}
+
+/* No axis of `to` becomes longer than width_max, nor than the longest of `from` where that is
+ * longer already, as in models of a few for a large molecule. */
+static void bound_axes(const double *from, double width_max, double *to) {
+    static const int diagonal[3] = {OV_FACTOR_L, OV_FACTOR_L + 3, OV_FACTOR_L + 5};
+    const double least = fmin(1.0 / (width_max * width_max), ov_factor_least_decay(from));
+    for (int k = 0; k < 3; ++k) /* L away from singular */
+        if (fabs(to[diagonal[k]]) < sqrt(least))
+            to[diagonal[k]] = copysign(sqrt(least), to[diagonal[k]]);
+    ov_factor_bound_decay(to, least);
+}
+
+/* The step shortened ellipsoid by ellipsoid, and axes bounded. */
+static void take_step(const double *x, const double *step, size_t count, double width_max,
+                      double *trial) {
+    for (size_t i = 0; i < count; ++i) {
+        const double *const from = x + i * OV_FACTOR_PARAMETERS;
+        const double *const by = step + i * OV_FACTOR_PARAMETERS;
+        double *const to = trial + i * OV_FACTOR_PARAMETERS;
+        double centre = 0.0, factor = 0.0, size = 0.0;
+        for (int k = 0; k < 3; ++k)
+            centre += by[OV_FACTOR_CENTRE + k] * by[OV_FACTOR_CENTRE + k];
+        for (int k = OV_FACTOR_L; k < OV_FACTOR_PARAMETERS; ++k) {
+            factor += by[k] * by[k];
+            size += from[k] * from[k];
+        }
+        const double share = fmax(fmax(sqrt(centre) / CENTRE_STEP, fabs(by[0]) / AMPLITUDE_STEP),
+                                  sqrt(factor / size) / FACTOR_STEP);
+        const double scale = share > 1.0 ? 1.0 / share : 1.0;
+        for (int k = 0; k < OV_FACTOR_PARAMETERS; ++k)
+            to[k] = from[k] + scale * by[k];
+        if (!ov_factor_decays_reach(to, 1.0 / (width_max * width_max)))
+            bound_axes(from, width_max, to);
+    }
+}
+
+static ovoid_status find_step(ov_refiner *r, const ov_target *target,
+                              const ov_refine_options *options, const double *x, double damping,
+                              bool fresh) {
+    ovoid_status status = OVOID_OK;
+    const ov_system system = {.points = target->points,
+                              .terms = &r->now.terms,
+                              .lists = &r->now.lists,
+                              .weight = &r->now.active,
+                              .moments = &r->moments,
+                              .gram = &r->gram,
+                              .parameters = x};
+    if (fresh) {
+        OV_TRY(ov_moments(r->context, &r->operations, target->points, &r->now.terms, &r->now.lists,
+                          &r->now.u, &r->moments));
+        OV_TRY(ov_gram(r->context, &r->operations, target->points, &r->now.terms, &r->now.lists,
+                       &r->now.active, &r->gram));
+    }
+    OV_TRY(ov_solve(r->context, &r->solver, &r->operations, &system, damping, options->solver_steps,
+                    options->solver_tolerance, r->step));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_refine(ov_refiner *r, const ov_target *target, const ov_refine_options *options,
+                       double *x, size_t count, double *misfit) {
+    ovoid_status status = OVOID_OK;
+    const size_t bytes = count * OV_FACTOR_PARAMETERS * sizeof *x;
+    double damping = options->damping, tried;
+    unsigned small = 0;
+    bool fresh = true, failed = false; /* the last step */
+    OV_TRY(ov_refine_evaluate(r, target, x, count, misfit));
+    for (uint32_t n = 1; n <= options->steps && small < 2 && damping < DAMPING_MAX; ++n) {
+        OV_TRY(find_step(r, target, options, x, damping, fresh));
+        take_step(x, r->step, count, options->width_max, r->trial);
+        status = evaluate(r, &r->tried, target, r->trial, count, &tried);
+        if (status == OVOID_ERROR_NUMERIC) { /* too far out to be a model: as good as rejected */
+            status = OVOID_OK;
+            tried = INFINITY;
+        }
+        OV_TRY(status);
+        ++r->steps;
+        fresh = tried < *misfit;
+        if (fresh) {
+            small = *misfit - tried < options->decrease * *misfit ? small + 1 : 0;
+            const ov_evaluation swap = r->now;
+            r->now = r->tried;
+            r->tried = swap;
+            memcpy(x, r->trial, bytes);
+            *misfit = tried;
+            if (!failed)
+                damping = fmax(DAMPING_DOWN * damping, DAMPING_MIN);
+        } else {
+            damping *= DAMPING_UP;
+        }
+        failed = !fresh;
+        if (options->go_on && !options->go_on(n, *misfit, options->user)) {
+            status = ov_fail(r->context, OVOID_ERROR_CANCELLED, "stopped while refining");
+            goto cleanup;
+        }
+        if (fresh && options->enough && options->enough(x, count, options->where))
+            break;
+    }
+cleanup:
+    return status;
+}
+
+void ov_refiner_forget(ov_refiner *r) {
+    r->now.listed_points = r->tried.listed_points = NULL;
+    r->now.listed_count = r->tried.listed_count = 0;
+}
+
+static void destroy_evaluation(ov_evaluation *e) {
+    ov_terms_destroy(&e->terms);
+    ov_lists_destroy(&e->lists);
+    ov_buffer_destroy(&e->value);
+    ov_buffer_destroy(&e->u);
+    ov_buffer_destroy(&e->active);
+    ov_buffer_destroy(&e->sums);
+    free(e->listed);
+    free(e->skins);
+}
+
+void ov_refiner_destroy(ov_refiner *r) {
+    destroy_evaluation(&r->now);
+    destroy_evaluation(&r->tried);
+    ov_operations_destroy(&r->operations);
+    ov_solver_destroy(&r->solver);
+    ov_kernel_destroy(&r->misfit);
+    ov_buffer_destroy(&r->moments);
+    ov_buffer_destroy(&r->gram);
+    free(r->quadrics);
+    free(r->trial);
+    free(r->step);
+    free(r->host);
+    memset(r, 0, sizeof *r);
+}

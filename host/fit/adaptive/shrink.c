@@ -1,0 +1,299 @@
+#include "fit/adaptive/tolerance.h"
+#include "mixture/component.h"
+#include "neighbours/neighbours.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Merged at once: this share of the ellipsoids at most, and so far apart (angstrom) that each
+ * merge's neighbours can make up for it. */
+#define SHARE 0.12
+#define SHARE_MIN 0.015
+#define TRIES_MIN 2
+#define APART 7.0
+#define ADAPT_REACH 10.0
+/* Of all pairs of neighbours, the cheapest: few of the others can merge. */
+#define PAIRS_PER_EFFORT 0.5
+/* A merge that was too much is not tried again: none within this (angstrom) of where it lay, */
+#define SAME_MERGE 1.0
+/* and a place is left alone where so many were too much: at first few, so that all places have
+ * their turn, in the end so many per effort. */
+#define DONE_REACH 5.0
+#define DONE_FIRST 2
+#define DONE_PER_EFFORT 8
+/* Where the model is off after a round of merges, the nearest are taken back, in so many rounds,
+ * and what is this near to a spot adapts to it; what is still off then grows. */
+#define BACK_ROUNDS 2
+#define BACK_REACH 8.0
+#define REGROW_ROUNDS 6
+/* Shrinking ends when so many rounds and tries per effort gained less than this share together. */
+#define GAIN 0.006
+#define IDLE_ROUNDS 5
+#define IDLE_TRIES 30
+
+/* A model that shrinks. */
+typedef struct shrinking {
+    ov_trial next;      /* the best model merged */
+    uint32_t *parents;  /* as of ov_merge_cheapest(): in the best model */
+    ov_places failed;   /* where merging was too much */
+    ov_grid same, done; /* of these */
+    size_t limit, most; /* failures until a place is left alone, for now and for ever */
+    bool *chosen;
+    double *x; /* room for a model */
+    uint32_t *more_parents;
+    double share;                   /* of the ellipsoids that are merged at once */
+    size_t milestone;               /* the last count that was a gain */
+    size_t idle_rounds, idle_tries; /* since */
+} shrinking;
+
+static ovoid_status shrinking_create(ov_adaptive *f, shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    *s = (shrinking){.share = SHARE,
+                     .limit = DONE_FIRST,
+                     .most = DONE_PER_EFFORT * (size_t)f->options->adaptive.effort};
+    OV_TRY(ov_trial_create(f, &s->next));
+    s->parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
+    s->more_parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
+    s->chosen = ov_alloc(f->context, f->capacity, sizeof *s->chosen, "ellipsoids");
+    s->x = ov_alloc(f->context, f->capacity * OV_FACTOR_PARAMETERS, sizeof *s->x, "parameters");
+    if (!s->parents || !s->more_parents || !s->chosen || !s->x)
+        status = OVOID_ERROR_MEMORY;
+cleanup:
+    return status;
+}
+
+static void forget_grids(shrinking *s) {
+    ov_grid_destroy(&s->same);
+    ov_grid_destroy(&s->done);
+}
+
+static void shrinking_destroy(shrinking *s) {
+    ov_trial_destroy(&s->next);
+    ov_places_destroy(&s->failed);
+    forget_grids(s);
+    free(s->parents);
+    free(s->more_parents);
+    free(s->chosen);
+    free(s->x);
+}
+
+/* ---- merging -------------------------------------------------------------------------------- */
+
+/* Whether a merge may lie there, after those that were too much. */
+static bool allowed(const double centre[3], void *user) {
+    const shrinking *const s = user;
+    uint32_t near[2 * OV_NEAR_MAX];
+    return s->failed.count == 0 || (ov_grid_near(&s->same, centre, UINT32_MAX, near) == 0 &&
+                                    ov_grid_near(&s->done, centre, UINT32_MAX, near) < s->limit);
+}
+
+static ovoid_status index_failures(ov_adaptive *f, shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    const ov_places *const failed = &s->failed;
+    forget_grids(s);
+    if (failed->count == 0)
+        return OVOID_OK;
+    OV_TRY(ov_grid_of(f->context, failed->place->at, sizeof *failed->place, failed->count,
+                      SAME_MERGE, &s->same));
+    OV_TRY(ov_grid_of(f->context, failed->place->at, sizeof *failed->place, failed->count,
+                      DONE_REACH, &s->done));
+cleanup:
+    return status;
+}
+
+/* Merges what costs least of the best model, in many places at once. */
+static ovoid_status merge(ov_adaptive *f, const ov_trial *best, shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    const size_t fewer = (size_t)fmax(s->share * (double)best->count, TRIES_MIN);
+    const ov_merging merging = {.share = PAIRS_PER_EFFORT * f->options->adaptive.effort,
+                                .allowed = allowed,
+                                .user = s,
+                                .apart = APART,
+                                .parents = s->parents};
+    double misfit;
+    OV_TRY(index_failures(f, s));
+    ov_trial_copy(best, &s->next);
+    OV_TRY(ov_refine_evaluate(&f->refiner, &f->target, s->next.x, s->next.count, &misfit));
+    OV_TRY(ov_merge_cheapest(&f->refiner, &f->merger, &f->target, s->next.x, &s->next.count, fewer,
+                             &merging));
+cleanup:
+    return status;
+}
+
+static bool is_merged(const shrinking *s, size_t i) {
+    return s->parents[2 * i + 1] != UINT32_MAX;
+}
+
+static const double *centre_of(const double *x, size_t i) {
+    return x + i * OV_FACTOR_PARAMETERS + OV_FACTOR_CENTRE;
+}
+
+static ovoid_status choose_near(ov_adaptive *f, const ov_spots *spots, double reach, shrinking *s) {
+    return ov_near_spots(f->context, spots, centre_of(s->next.x, 0),
+                         OV_FACTOR_PARAMETERS * sizeof(double), s->next.count, reach, s->chosen);
+}
+
+/* Lets what is near the merges make up for them. */
+static ovoid_status adapt(ov_adaptive *f, shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    ov_spots merged = {.spot = ov_alloc(f->context, s->next.count, sizeof *merged.spot, "merges")};
+    if (!merged.spot)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < s->next.count; ++i)
+        if (is_merged(s, i))
+            memcpy(merged.spot[merged.count++].at, centre_of(s->next.x, i), sizeof merged.spot->at);
+    OV_TRY(choose_near(f, &merged, ADAPT_REACH, s));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", OV_LOCAL_STEPS, s->chosen));
+cleanup:
+    ov_spots_destroy(&merged);
+    return status;
+}
+
+/* ---- taking back ---------------------------------------------------------------------------- */
+
+/* Chooses the merged ellipsoid that is nearest to each spot, wherever that is. */
+static void choose_nearest(const shrinking *s, const ov_spots *spots) {
+    for (size_t n = 0; n < spots->count; ++n) {
+        size_t best = s->next.count;
+        double least = INFINITY;
+        for (size_t i = 0; i < s->next.count; ++i) {
+            double square = 0.0;
+            for (int k = 0; k < 3; ++k)
+                square += pow(centre_of(s->next.x, i)[k] - spots->spot[n].at[k], 2);
+            if (is_merged(s, i) && square < least) {
+                least = square;
+                best = i;
+            }
+        }
+        if (best < s->next.count)
+            s->chosen[best] = true;
+    }
+}
+
+/* Takes note of where the merges chosen lay when they were made. */
+static ovoid_status remember(ov_adaptive *f, const ov_trial *best, shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    for (size_t i = 0; i < s->next.count; ++i) {
+        ov_component part[2];
+        double centre[3];
+        if (!s->chosen[i] || !is_merged(s, i))
+            continue;
+        for (size_t k = 0; k < 2; ++k) {
+            ov_quadric quadric;
+            ov_factor_quadric(best->x + s->parents[2 * i + k] * (size_t)OV_FACTOR_PARAMETERS,
+                              &quadric);
+            if (!ov_component_of_quadric(&quadric, &part[k]))
+                return ov_fail(f->context, OVOID_ERROR_NUMERIC, "an ellipsoid is degenerate");
+        }
+        ov_component_mean(&part[0], &part[1], centre);
+        OV_TRY(ov_places_add(f->context, &s->failed, centre));
+    }
+cleanup:
+    return status;
+}
+
+static void append(const double *x, uint32_t parent, uint32_t other, size_t *count, shrinking *s) {
+    memcpy(s->x + *count * OV_FACTOR_PARAMETERS, x, OV_FACTOR_PARAMETERS * sizeof *x);
+    s->more_parents[2 * *count] = parent;
+    s->more_parents[2 * *count + 1] = other;
+    ++*count;
+}
+
+/* Puts back what the chosen ellipsoids were in the best model. */
+static void take_back(const ov_trial *best, shrinking *s) {
+    size_t count = 0;
+    for (size_t i = 0; i < s->next.count; ++i) {
+        const uint32_t *const from = s->parents + 2 * i;
+        if (!s->chosen[i])
+            append(s->next.x + i * OV_FACTOR_PARAMETERS, from[0], from[1], &count, s);
+        for (size_t k = 0; s->chosen[i] && k < 2 && from[k] != UINT32_MAX; ++k)
+            append(best->x + from[k] * (size_t)OV_FACTOR_PARAMETERS, from[k], UINT32_MAX, &count,
+                   s);
+    }
+    memcpy(s->next.x, s->x, count * OV_FACTOR_PARAMETERS * sizeof *s->x);
+    memcpy(s->parents, s->more_parents, 2 * count * sizeof *s->parents);
+    s->next.count = count;
+}
+
+/* Takes back the merges nearest to the spots, and lets what is near adapt. */
+static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spots *spots,
+                             shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_adaptive_emphasise(f, spots));
+    memset(s->chosen, 0, s->next.count * sizeof *s->chosen);
+    choose_nearest(s, spots);
+    OV_TRY(remember(f, best, s));
+    take_back(best, s);
+    OV_TRY(choose_near(f, spots, BACK_REACH, s));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", OV_LOCAL_STEPS, s->chosen));
+cleanup:
+    return status;
+}
+
+/* Where merging was too much: takes merges back, and where that is not enough, grows. */
+static ovoid_status settle(ov_adaptive *f, double tolerance, const ov_trial *best, shrinking *s) {
+    ovoid_status status = OVOID_OK;
+    ov_spots spots = {0};
+    const ov_growing how = {.stage = "shrink", .most = best->count - 1, .rounds = REGROW_ROUNDS};
+    OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
+    for (int n = 0; n < BACK_ROUNDS && spots.count > 0 && s->next.count < best->count; ++n) {
+        OV_TRY(back_off(f, best, &spots, s));
+        OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
+    }
+    OV_TRY(ov_owner_merge(f->context, s->parents, s->next.count, best->count, best->owner, f->atoms,
+                          s->next.owner));
+    OV_TRY(ov_adaptive_grow(f, tolerance, &how, &s->next, &spots));
+cleanup:
+    ov_spots_destroy(&spots);
+    return status;
+}
+
+/* Fewer at once where most were too much: each then has its neighbours to itself. */
+static void choose_share(shrinking *s, size_t tries, size_t held) {
+    if (4 * held < tries)
+        s->share = fmax(0.5 * s->share, SHARE_MIN);
+    else if (2 * held > tries)
+        s->share = fmin(2.0 * s->share, SHARE);
+}
+
+/* Whether the last rounds were worth their while: too little was gained in a few of them and in
+ * enough tries, which in a small molecule take more rounds. */
+static bool is_idle(shrinking *s, size_t tries, size_t count, uint32_t effort) {
+    ++s->idle_rounds;
+    s->idle_tries += tries;
+    if ((double)count <= (1.0 - GAIN) * (double)s->milestone) {
+        s->milestone = count;
+        s->idle_rounds = 0;
+        s->idle_tries = 0;
+    }
+    return s->idle_rounds >= IDLE_ROUNDS * effort && s->idle_tries >= IDLE_TRIES * effort;
+}
+
+ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    shrinking s;
+    bool idle = false;
+    OV_TRY(shrinking_create(f, &s));
+    s.milestone = best->count;
+    while (!idle && best->count > 1) {
+        const size_t before = best->count;
+        OV_TRY(merge(f, best, &s));
+        const size_t tries = before - s.next.count;
+        if (tries == 0 && s.limit >= s.most)
+            break;
+        if (tries == 0) {
+            s.limit *= 2; /* another turn for each place */
+            continue;
+        }
+        OV_TRY(adapt(f, &s));
+        OV_TRY(settle(f, tolerance, best, &s));
+        if (s.next.count < before && ov_trial_holds(&s.next, tolerance))
+            ov_trial_swap(&s.next, best);
+        choose_share(&s, tries, before - best->count);
+        idle = is_idle(&s, tries, best->count, f->options->adaptive.effort);
+    }
+cleanup:
+    shrinking_destroy(&s);
+    return status;
+}

@@ -1,0 +1,41 @@
+/*
+ * The search for the fewest ellipsoids within a tolerance: growing where the model is off,
+ * shrinking where there is room, both place by place.
+ */
+#ifndef OV_ADAPTIVE_TOLERANCE_H
+#define OV_ADAPTIVE_TOLERANCE_H
+
+#include "fit/adaptive/parts.h"
+#include "fit/adaptive/places.h"
+
+/* Steps after a change here and there: counted, since the misfit of the whole says little of them.
+ */
+#define OV_LOCAL_STEPS 12
+
+/* How long growing may go on. */
+typedef struct ov_growing {
+    const char *stage;
+    size_t most; /* ellipsoids */
+    int rounds;
+} ov_growing;
+
+/* Whether the tolerance was seen to hold when the trial was judged last. */
+bool ov_trial_holds(const ov_trial *t, double tolerance);
+
+/* Judges a trial and finds the spots that are off, `most` at most; none where the tolerance holds.
+ */
+ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
+                               ov_spots *spots);
+
+/* Makes the points about the spots weigh more from now on. */
+ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots);
+
+/* Adds ellipsoids at the spots, as of ov_adaptive_spots(), and where the model is off after that,
+ * until the tolerance holds: *spots are none then. */
+ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing *how, ov_trial *t,
+                              ov_spots *spots);
+
+/* Merges ellipsoids of the best model, which holds, as long as it holds. */
+ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best);
+
+#endif

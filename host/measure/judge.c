@@ -1,0 +1,269 @@
+#include "measure/judge.h"
+#include "measure/distance.h"
+#include "mesh/march.h"
+#include "model/factor.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* How much the whole surface's distance, cavities included, counts beside the outer one's, and the
+ * area's relative error (angstrom). */
+#define SCORE_WHOLE 0.3
+#define SCORE_AREA 10.0
+/* Where spots are looked for, distances below this share of theirs are only bounded. */
+#define ENOUGH 0.8
+
+/* The light mesh of some bodies, its area and its volume; the normals have done their part then.
+ * *mesh is NULL where there is no surface. */
+static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
+                                ovoid_mesh **mesh, ov_content *content) {
+    const ovoid_status status = ov_mesh_bodies_light(judge->context, bodies, count, &judge->meshing,
+                                                     judge->origin, &judge->watch, mesh);
+    if (status == OVOID_OK) {
+        if (content)
+            *content = ov_mesh_smooth(*mesh, false);
+        free((*mesh)->normals);
+        (*mesh)->normals = NULL;
+    }
+    if (status != OVOID_ERROR_EMPTY)
+        return status;
+    *mesh = NULL;
+    return OVOID_OK;
+}
+
+/* The middle of the atoms' box. */
+static void middle_of(const double *xyzr, size_t atoms, double origin[3]) {
+    for (size_t k = 0; k < 3; ++k) {
+        double low = INFINITY, high = -INFINITY;
+        for (size_t i = 0; i < atoms; ++i) {
+            low = fmin(low, xyzr[4 * i + k]);
+            high = fmax(high, xyzr[4 * i + k]);
+        }
+        origin[k] = atoms > 0 ? 0.5 * low + 0.5 * high : 0.0;
+    }
+}
+
+static bool has_outer(const ovoid_mesh *mesh) {
+    for (size_t c = 0; mesh && c < mesh->components; ++c)
+        if (mesh->component[c].outer)
+            return true;
+    return false;
+}
+
+ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                             double isovalue, double spacing, ov_watch watch, ov_judge *judge) {
+    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay), .watch = watch};
+    ov_body *const bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
+    if (!bodies)
+        return OVOID_ERROR_MEMORY;
+    ovoid_mesh_options_init(&made.meshing);
+    made.meshing.isovalue = isovalue;
+    made.meshing.spacing = spacing;
+    middle_of(xyzr, atoms, made.origin);
+    for (size_t i = 0; i < atoms; ++i)
+        ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
+    const ovoid_status status = mesh_bodies(&made, bodies, atoms, &made.mesh, &made.content);
+    free(bodies);
+    if (status == OVOID_OK)
+        *judge = made;
+    else
+        ov_judge_destroy(&made);
+    return status;
+}
+
+void ov_judge_destroy(ov_judge *judge) {
+    ovoid_mesh_destroy(&judge->mesh);
+    memset(judge, 0, sizeof *judge);
+}
+
+static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                               ovoid_mesh **mesh, ov_content *content) {
+    ov_body *const bodies = ov_alloc(judge->context, count, sizeof *bodies, "ellipsoids");
+    if (!bodies)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < count; ++i) {
+        ovoid_ellipsoid ellipsoid;
+        ov_ellipsoid_of_quadric(&quadrics[i], &ellipsoid);
+        ov_body_of_ellipsoid(&ellipsoid, &bodies[i]);
+    }
+    const ovoid_status status = mesh_bodies(judge, bodies, count, mesh, content);
+    free(bodies);
+    if (status != OVOID_ERROR_LIMIT)
+        return status;
+    *mesh = NULL; /* what was merged across empty space is no surface to compare with */
+    return OVOID_OK;
+}
+
+static int by_distance(const void *a, const void *b) {
+    const ov_spot *const p = a, *const q = b;
+    if (p->distance != q->distance)
+        return p->distance > q->distance ? -1 : 1;
+    for (int k = 0; k < 3; ++k)
+        if (p->at[k] != q->at[k])
+            return p->at[k] < q->at[k] ? -1 : 1;
+    return 0;
+}
+
+/* Counts them alone where spots is NULL. */
+static void add_spots(const ovoid_mesh *mesh, const float *distance, double least, ov_spot *spots,
+                      size_t *count) {
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        if (distance[v] >= least && ov_mesh_is_outer(mesh, v)) {
+            if (spots) {
+                ov_mesh_at(mesh, v, spots[*count].at);
+                spots[*count].distance = distance[v];
+            }
+            ++*count;
+        }
+}
+
+/* Keeps the worst of each neighbourhood. */
+static void thin_spots(ov_spot *spots, size_t *count, double apart, size_t most) {
+    size_t kept = 0;
+    qsort(spots, *count, sizeof *spots, by_distance);
+    for (size_t n = 0; n < *count && kept < most; ++n) {
+        bool near = false;
+        for (size_t m = 0; m < kept && !near; ++m) {
+            double square = 0.0;
+            for (int k = 0; k < 3; ++k)
+                square += (spots[n].at[k] - spots[m].at[k]) * (spots[n].at[k] - spots[m].at[k]);
+            near = square < apart * apart;
+        }
+        if (!near)
+            spots[kept++] = spots[n];
+    }
+    *count = kept;
+}
+
+static void judge_distances(const ovoid_mesh *mesh, const float *distance,
+                            ov_judgement *judgement) {
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        judgement->hausdorff = fmax(judgement->hausdorff, distance[v]);
+        if (ov_mesh_is_outer(mesh, v))
+            judgement->deviation = fmax(judgement->deviation, distance[v]);
+    }
+}
+
+/* A model's mesh, and how far its vertices and those of the original are from the other surface. */
+typedef struct trial {
+    ovoid_mesh *mesh;
+    float *from_original, *from_model; /* NULL where there are no two outer surfaces */
+} trial;
+
+static void trial_destroy(trial *t) {
+    free(t->from_original);
+    free(t->from_model);
+    ovoid_mesh_destroy(&t->mesh);
+}
+
+static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = judge->context;
+    t->from_original =
+        ov_alloc(context, judge->mesh->vertices, sizeof *t->from_original, "distances");
+    t->from_model = ov_alloc(context, t->mesh->vertices, sizeof *t->from_model, "distances");
+    if (!t->from_original || !t->from_model) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    OV_TRY(ov_vertex_distances(context, judge->mesh, t->mesh, judge->origin, enough, &judge->watch,
+                               t->from_original));
+    OV_TRY(ov_vertex_distances(context, t->mesh, judge->mesh, judge->origin, enough, &judge->watch,
+                               t->from_model));
+cleanup:
+    return status;
+}
+
+/* content may be NULL. */
+static ovoid_status try_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                              double enough, trial *t, ov_content *content,
+                              ov_judgement *judgement) {
+    ovoid_status status = OVOID_OK;
+    *judgement = (ov_judgement){.hausdorff = INFINITY, .deviation = INFINITY, .score = INFINITY};
+    OV_TRY(mesh_model(judge, quadrics, count, &t->mesh, content));
+    if (!has_outer(t->mesh) || !has_outer(judge->mesh))
+        goto cleanup;
+    OV_TRY(measure_trial(judge, enough, t));
+    *judgement =
+        (ov_judgement){.valid = true, .area_error = NAN, .volume_ratio = NAN, .score = NAN};
+    judge_distances(judge->mesh, t->from_original, judgement);
+    judge_distances(t->mesh, t->from_model, judgement);
+cleanup:
+    return status;
+}
+
+/* *spots: of the trial's surfaces; free with free(). */
+static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least, double apart,
+                                  size_t most, ov_spot **spots, size_t *spot_count) {
+    size_t room = 0;
+    *spot_count = 0;
+    add_spots(judge->mesh, t->from_original, least, NULL, &room);
+    add_spots(t->mesh, t->from_model, least, NULL, &room);
+    *spots = ov_alloc(judge->context, room, sizeof **spots, "spots");
+    if (!*spots)
+        return OVOID_ERROR_MEMORY;
+    add_spots(judge->mesh, t->from_original, least, *spots, spot_count);
+    add_spots(t->mesh, t->from_model, least, *spots, spot_count);
+    thin_spots(*spots, spot_count, apart, most);
+    return OVOID_OK;
+}
+
+ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
+                            double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
+                            size_t *spot_count) {
+    ovoid_status status = OVOID_OK;
+    trial t = {0};
+    *spots = NULL;
+    *spot_count = 0;
+    OV_TRY(try_model(judge, quadrics, count, ENOUGH * least, &t, NULL, judgement));
+    if (judgement->valid)
+        OV_TRY(collect_spots(judge, &t, least, apart, most, spots, spot_count));
+cleanup:
+    trial_destroy(&t);
+    return status;
+}
+
+ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                            ov_judgement *judgement) {
+    ovoid_status status = OVOID_OK;
+    trial t = {0};
+    ov_content content;
+    OV_TRY(try_model(judge, quadrics, count, 0.0, &t, &content, judgement));
+    if (!judgement->valid)
+        goto cleanup;
+    judgement->area_error = fabs(content.area - judge->content.area) / judge->content.area;
+    judgement->volume_ratio = content.volume / judge->content.volume;
+    judgement->score = judgement->deviation +
+                       SCORE_WHOLE * (judgement->hausdorff - judgement->deviation) +
+                       SCORE_AREA * judgement->area_error;
+cleanup:
+    trial_destroy(&t);
+    return status;
+}
+
+ovoid_status ov_judge_volume(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                             double *ratio) {
+    ovoid_mesh *mesh = NULL;
+    ov_content content;
+    *ratio = 1.0;
+    if (!judge->mesh)
+        return OVOID_OK;
+    const ovoid_status status = mesh_model(judge, quadrics, count, &mesh, &content);
+    if (mesh)
+        *ratio = content.volume / judge->content.volume;
+    ovoid_mesh_destroy(&mesh);
+    return status;
+}
+
+/* Mean of |grad phi| / c over the surfaces of molecules, in units of sqrt(2 d). */
+#define MEAN_SLOPE 1.5
+#define FACTOR_MOST 1.1
+
+double ov_judge_amplitude_factor(const ov_judge *judge, double volume_ratio) {
+    if (!judge->mesh || !(judge->content.area > 0.0))
+        return 1.0;
+    const double per_log = judge->content.area / (MEAN_SLOPE * judge->root_2d);
+    const double log_factor = (1.0 - volume_ratio) * judge->content.volume / per_log;
+    return fmin(fmax(exp(log_factor), 1.0 / FACTOR_MOST), FACTOR_MOST);
+}

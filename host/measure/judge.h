@@ -1,0 +1,60 @@
+/*
+ * Judging a model by its surface: meshes of both, distances, and where they are largest.
+ */
+#ifndef OV_JUDGE_H
+#define OV_JUDGE_H
+
+#include "field/quadric.h"
+#include "mesh/mesh.h"
+
+/* The original's surface, meshed once: a light mesh without normals. mesh is NULL where the field
+ * never reaches the isovalue. */
+typedef struct ov_judge {
+    ovoid_context *context;
+    ovoid_mesh_options meshing;
+    double origin[3]; /* of the meshes' offsets, angstrom */
+    ovoid_mesh *mesh;
+    ov_content content;
+    double root_2d; /* sqrt(2 decay), angstrom^-1 */
+    ov_watch watch; /* asked during whatever takes long */
+} ov_judge;
+
+typedef struct ov_judgement {
+    bool valid;          /* there are two surfaces to compare */
+    double hausdorff;    /* of the whole surfaces, angstrom */
+    double deviation;    /* as in ovoid_measures, angstrom */
+    double area_error;   /* relative */
+    double volume_ratio; /* the model's volume over the original's */
+    double score;        /* what repairs make smaller: mostly the deviation, angstrom */
+} ov_judgement;
+
+/* A place where an outer surface is far from the other surface. */
+typedef struct ov_spot {
+    double at[3];
+    double distance;
+} ov_spot;
+
+ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                             double isovalue, double spacing, ov_watch watch, ov_judge *judge);
+void ov_judge_destroy(ov_judge *judge);
+
+/* Distances are those of the meshes' vertices, which lie on the surfaces. */
+ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                            ov_judgement *judgement);
+
+/* The *spot_count places where the deviation is at least `least`, largest first, none nearer to
+ * another than `apart`, at most `most`. *spots is to be freed. Of the judgement hausdorff and
+ * deviation are filled in, exact where they are not much below `least`, else only bounds. */
+ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
+                            double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
+                            size_t *spot_count);
+
+/* The model's volume over the original's; 1 where there is nothing to compare. */
+ovoid_status ov_judge_volume(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                             double *ratio);
+
+/* By what to multiply all amplitudes so that a volume ratio becomes 1, about: the surface moves by
+ * c / |grad phi~| per unit of ln a. */
+double ov_judge_amplitude_factor(const ov_judge *judge, double volume_ratio);
+
+#endif

@@ -1,0 +1,133 @@
+#include "measure/measure.h"
+#include "measure/distance.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void ovoid_measure_options_init(ovoid_measure_options *options) {
+    if (!options)
+        return;
+    *options = (ovoid_measure_options){.isovalue = OVOID_DEFAULT_ISOVALUE,
+                                       .spacing = OVOID_DEFAULT_MESH_SPACING,
+                                       .vertices = OVOID_VERTEX_EXACT,
+                                       .distances = true};
+}
+
+static ovoid_pair pair_of(double original, double sparse) {
+    const double difference = fabs(sparse - original);
+    return (ovoid_pair){original, sparse, difference > 0.0 ? difference / fabs(original) : 0.0};
+}
+
+static uint64_t count_outer(const ovoid_mesh *mesh) {
+    uint64_t count = 0;
+    for (size_t c = 0; c < mesh->components; ++c)
+        count += mesh->component[c].outer;
+    return count;
+}
+
+static ovoid_status compare_contents(ovoid_context *context, const ovoid_mesh *original,
+                                     const ovoid_mesh *sparse, bool smooth, bool outer_only,
+                                     ovoid_pair *area, ovoid_pair *volume) {
+    ovoid_status status = OVOID_OK;
+    ov_content first, second;
+    OV_TRY(ov_mesh_content(context, original, smooth, outer_only, &first));
+    OV_TRY(ov_mesh_content(context, sparse, smooth, outer_only, &second));
+    *area = pair_of(first.area, second.area);
+    *volume = pair_of(first.volume, second.volume);
+cleanup:
+    return status;
+}
+
+static double largest_of_outer(const ovoid_mesh *mesh, const float *distance) {
+    double largest = 0.0;
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        if (ov_mesh_is_outer(mesh, v))
+            largest = fmax(largest, distance[v]);
+    return largest;
+}
+
+/* The distances of the whole surfaces, and with them the deviation. */
+static ovoid_status compare_vertices(ovoid_context *context, const ovoid_mesh *original,
+                                     const ovoid_mesh *sparse, ovoid_measures *measures) {
+    ovoid_status status = OVOID_OK;
+    float *const first = ov_alloc(context, original->vertices, sizeof *first, "distances");
+    float *const second = ov_alloc(context, sparse->vertices, sizeof *second, "distances");
+    if (!first || !second) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    OV_TRY(
+        ov_mesh_distances(context, original, sparse, false, &measures->distances, first, second));
+    measures->deviation = fmax(largest_of_outer(original, first), largest_of_outer(sparse, second));
+cleanup:
+    free(first);
+    free(second);
+    return status;
+}
+
+ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *original,
+                               const ovoid_mesh *sparse, bool smooth, bool distances,
+                               ovoid_measures *measures) {
+    ovoid_status status = OVOID_OK;
+    const double begin = ov_seconds();
+    ovoid_measures made = {.components_original = original->components,
+                           .components_sparse = sparse->components,
+                           .outer_original = count_outer(original),
+                           .outer_sparse = count_outer(sparse)};
+    OV_TRY(compare_contents(context, original, sparse, smooth, false, &made.area, &made.volume));
+    OV_TRY(compare_contents(context, original, sparse, smooth, true, &made.area_outer,
+                            &made.volume_outer));
+    if (distances) {
+        OV_TRY(compare_vertices(context, original, sparse, &made));
+        made.distances_outer = made.distances;
+        if (made.outer_original < original->components || made.outer_sparse < sparse->components)
+            OV_TRY(
+                ovoid_mesh_distances(context, original, sparse, true, &made.distances_outer, NULL));
+    }
+    made.seconds_distances = ov_seconds() - begin;
+    *measures = made;
+cleanup:
+    return status;
+}
+
+/* Says which of the two surfaces failed. */
+static ovoid_status name_failure(ovoid_context *context, ovoid_status status, const char *which) {
+    const bool named = status != OVOID_OK && status != OVOID_ERROR_CANCELLED;
+    char *const text = !named ? NULL : strdup(ovoid_context_error(context));
+    if (text)
+        ov_fail(context, status, "the surface of the %s: %s", which, text);
+    free(text);
+    return status;
+}
+
+ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecule,
+                           const ovoid_model *model, const ovoid_measure_options *options,
+                           ovoid_measures *measures) {
+    ovoid_status status = OVOID_OK;
+    ovoid_mesh *original = NULL, *sparse = NULL;
+    ovoid_measures made;
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, model);
+    OV_NEED(context, options);
+    OV_NEED(context, measures);
+    ov_progress_begin(context, "mesh");
+    const double begin = ov_seconds();
+    const ovoid_mesh_options meshing = {options->isovalue, options->spacing, options->vertices};
+    status = ovoid_molecule_mesh(context, molecule, ovoid_model_decay(model), &meshing, &original);
+    OV_TRY(name_failure(context, status, "molecule"));
+    status = ovoid_model_mesh(context, model, &meshing, &sparse);
+    OV_TRY(name_failure(context, status, "model"));
+    const double meshed = ov_seconds();
+    ov_progress_stage(context, "measure");
+    OV_TRY(ov_measure_meshes(context, original, sparse, options->vertices == OVOID_VERTEX_EXACT,
+                             options->distances, &made));
+    made.seconds_mesh = meshed - begin;
+    *measures = made;
+cleanup:
+    ovoid_mesh_destroy(&original);
+    ovoid_mesh_destroy(&sparse);
+    ov_progress_end(context);
+    return status;
+}

@@ -1,0 +1,893 @@
+#include "mesh/march.h"
+
+#include "field/bricks.h"
+#include "mesh/brick_grid.h"
+#include "mesh/case_table.h"
+#include "mesh/mesh.h"
+#include "mesh/specks.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Newton's steps of a vertex at most: a few, or enough to halve a bracket down to rounding. */
+#define REFINE_STEPS 24
+#define REFINE_CLOSE 1e-4 /* lattice steps; what is left after such a step is of order 1e-8 */
+
+#define BOX 6        /* low x, y, z, high x, y, z */
+#define CROSSING 4   /* values per brick: number of the first vertex, masks along x, y, z */
+#define BRICK_RUN 32 /* bricks per work-item of the kernels over all bricks, on CPUs */
+
+/* What a piece leaves behind for those before it: its faces. */
+typedef struct piece_faces {
+    float *value;      /* OV_PACK per face brick */
+    cl_uint *crossing; /* CROSSING per face brick */
+} piece_faces;
+
+typedef struct marcher {
+    const ov_body *bodies;
+    const ovoid_mesh_options *options;
+    const double *origin; /* of the offsets of a light mesh, else NULL */
+    const ov_watch *watch;
+    ov_pieces pieces;
+    piece_faces *faces; /* of each piece; empty where not needed, or no longer */
+    size_t faces_end;   /* those from here on are gone */
+    ov_brick_grid grid;
+    uint64_t at[3]; /* the current piece */
+    double corner[3];
+
+    ov_points points;
+    ov_terms terms;
+    ov_lists lists;
+    ov_operations operations;
+    ov_kernel signs, count, get, put, fill_vertices, fill_triangles, refine;
+    ov_buffer value, sign, crossing, triangle_count, cases, list, edge, t, normal, corners;
+    ov_buffer face_list, ghost_list, place, values, crossings;
+    size_t group;
+    cl_uint run;
+
+    ov_quadric *quadrics; /* of one piece */
+    size_t quadrics_capacity;
+    cl_uint *host_crossing; /* of the padded grid */
+    cl_uint *host_count;    /* triangles of each brick */
+    float *ghost_value;
+    cl_uint *ghost_crossing;
+    bool ghosts_empty; /* on the device */
+    cl_uint *active;   /* entries of march_vertices()'s list */
+    size_t active_count;
+    cl_uint *edges; /* of the piece's vertices, in packs */
+    size_t edges_capacity;
+    float *boxes, *refined;
+    size_t boxes_capacity, refined_capacity;
+    float largest; /* value met while there was no vertex */
+
+    double *xyz;    /* the mesh so far, */
+    float *offsets; /* with these in place of xyz if it is light */
+    float *normals;
+    uint32_t *triangle;
+    uint8_t *edge_of; /* of the mesh's vertices, unless it is light */
+    size_t edge_of_capacity, missed;
+    size_t xyz_capacity, offsets_capacity, normals_capacity, triangle_capacity;
+    size_t vertices, triangles;
+    size_t new_vertices, new_triangles; /* of the piece */
+} marcher;
+
+/* ---- setting up --------------------------------------------------------------------------- */
+
+static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
+    static const char *const names[] = {
+        "march_signs",    "march_count",     "march_get",    "march_put",
+        "march_vertices", "march_triangles", "march_refine",
+    };
+    ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
+                                  &m->fill_vertices, &m->fill_triangles, &m->refine};
+    for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k) {
+        const ovoid_status status = ov_kernel_create(context, "march", names[k], kernels[k]);
+        if (status != OVOID_OK)
+            return status;
+    }
+    return OVOID_OK;
+}
+
+static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    const ov_brick_grid *const grid = &m->grid;
+    const size_t padded = grid->padded_total, faces = grid->face_start[3];
+    const size_t moved = faces > grid->ghosts ? faces : grid->ghosts;
+    ov_case_table cases;
+    ov_case_table_make(&cases);
+    OV_TRY(ov_buffer_put(context, &m->cases, &cases, sizeof cases, "cases of marching cubes"));
+    OV_TRY(ov_buffer_put(context, &m->face_list, grid->face, faces * sizeof(cl_uint),
+                         "lattice bricks"));
+    OV_TRY(ov_buffer_put(context, &m->ghost_list, grid->ghost, grid->ghosts * sizeof(cl_uint),
+                         "lattice bricks"));
+    OV_TRY(
+        ov_buffer_put(context, &m->place, grid->place, padded * sizeof(cl_uint), "lattice bricks"));
+    OV_TRY(
+        ov_buffer_reserve(context, &m->value, padded * OV_PACK * sizeof(float), "lattice values"));
+    OV_TRY(ov_buffer_reserve(context, &m->sign, padded * sizeof(cl_uint), "signs of bricks"));
+    OV_TRY(ov_buffer_reserve(context, &m->crossing, padded * CROSSING * sizeof(cl_uint),
+                             "crossings of bricks"));
+    OV_TRY(ov_buffer_reserve(context, &m->triangle_count, grid->total * sizeof(cl_uint),
+                             "triangles of bricks"));
+    OV_TRY(
+        ov_buffer_reserve(context, &m->values, moved * OV_PACK * sizeof(float), "values at faces"));
+    OV_TRY(ov_buffer_reserve(context, &m->crossings, moved * CROSSING * sizeof(cl_uint),
+                             "crossings at faces"));
+    m->host_crossing = ov_alloc(context, padded * CROSSING, sizeof(cl_uint), "crossings of bricks");
+    m->host_count = ov_alloc(context, grid->total, sizeof(cl_uint), "triangles of bricks");
+    m->active = ov_alloc(context, grid->total * 4, sizeof(cl_uint), "bricks at the surface");
+    m->ghost_value = ov_alloc(context, moved * OV_PACK, sizeof(float), "values at faces");
+    m->ghost_crossing = ov_alloc(context, moved * CROSSING, sizeof(cl_uint), "crossings at faces");
+    m->faces = ov_alloc(context, m->pieces.pieces, sizeof *m->faces, "pieces of the lattice");
+    m->faces_end = m->pieces.pieces;
+    if (!m->host_crossing || !m->host_count || !m->active || !m->ghost_value ||
+        !m->ghost_crossing || !m->faces)
+        status = OVOID_ERROR_MEMORY;
+cleanup:
+    return status;
+}
+
+static ovoid_status set_up(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
+    const double step[3] = {m->pieces.spacing, m->pieces.spacing, m->pieces.spacing};
+    OV_TRY(ov_device_get(context, &device));
+    m->group = ov_item_group(device);
+    m->run = device->shape.lanes == 1 ? BRICK_RUN : 1;
+    OV_TRY(make_kernels(context, m));
+    OV_TRY(ov_brick_grid_create(context, m->pieces.size, &m->grid));
+    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
+    OV_TRY(reserve_piece(context, m));
+cleanup:
+    return status;
+}
+
+/* ---- faces between pieces ----------------------------------------------------------------- */
+
+/* The piece at this offset from the current one, or pieces->pieces. */
+static size_t neighbour(const marcher *m, int x, int y, int z) {
+    const int offset[3] = {x, y, z};
+    const uint64_t *const count = m->pieces.count;
+    uint64_t at[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        at[axis] = m->at[axis] + (uint64_t)offset[axis]; /* below 0 wraps far above count */
+        if (at[axis] >= count[axis])
+            return m->pieces.pieces;
+    }
+    return ov_pieces_find(&m->pieces, (at[2] * count[1] + at[1]) * count[0] + at[0]);
+}
+
+/* Copies `count` bricks, `stride` apart, of a neighbour's faces to the ghosts; zeros without one.
+ */
+static size_t copy_ghosts(marcher *m, size_t ghost, size_t piece, size_t face, size_t stride,
+                          size_t count, bool *any) {
+    const piece_faces *const from = piece < m->pieces.pieces ? &m->faces[piece] : NULL;
+    for (size_t k = 0; k < count; ++k, ++ghost, face += stride) {
+        float *const value = m->ghost_value + ghost * OV_PACK;
+        cl_uint *const crossing = m->ghost_crossing + ghost * CROSSING;
+        if (from && from->value) {
+            memcpy(value, from->value + face * OV_PACK, OV_PACK * sizeof *value);
+            memcpy(crossing, from->crossing + face * CROSSING, CROSSING * sizeof *crossing);
+            *any = true;
+        } else {
+            memset(value, 0, OV_PACK * sizeof *value);
+            memset(crossing, 0, CROSSING * sizeof *crossing);
+        }
+    }
+    return ghost;
+}
+
+/* What the neighbours found at the points after the piece's last ones. Without neighbours that is
+ * 0, which evaluation has left there. */
+static ovoid_status fill_ghosts(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    const ov_brick_grid *const grid = &m->grid;
+    const size_t *const start = grid->face_start, nx = grid->bricks[0], ny = grid->bricks[1],
+                        nz = grid->bricks[2];
+    const cl_uint count = (cl_uint)grid->ghosts;
+    bool any = false;
+    size_t k = copy_ghosts(m, 0, neighbour(m, 1, 0, 0), start[0], 1, ny * nz, &any);
+    k = copy_ghosts(m, k, neighbour(m, 0, 1, 0), start[1], 1, nx * nz, &any);
+    k = copy_ghosts(m, k, neighbour(m, 0, 0, 1), start[2], 1, nx * ny, &any);
+    k = copy_ghosts(m, k, neighbour(m, 1, 1, 0), start[0], ny, nz, &any);
+    k = copy_ghosts(m, k, neighbour(m, 1, 0, 1), start[0], 1, ny, &any);
+    k = copy_ghosts(m, k, neighbour(m, 0, 1, 1), start[1], 1, nx, &any);
+    copy_ghosts(m, k, neighbour(m, 1, 1, 1), start[0], 1, 1, &any);
+    if (!any && m->ghosts_empty)
+        return OVOID_OK;
+    m->ghosts_empty = !any;
+    OV_TRY(ov_buffer_write(context, &m->values, 0, m->ghost_value,
+                           grid->ghosts * OV_PACK * sizeof *m->ghost_value));
+    OV_TRY(ov_buffer_write(context, &m->crossings, 0, m->ghost_crossing,
+                           grid->ghosts * CROSSING * sizeof *m->ghost_crossing));
+    OV_TRY(OV_LAUNCH(context, &m->put, grid->ghosts, m->group, OV_ARG(count),
+                     OV_ARG(m->ghost_list.memory), OV_ARG(m->place.memory),
+                     OV_ARG(m->values.memory), OV_ARG(m->crossings.memory), OV_ARG(m->value.memory),
+                     OV_ARG(m->crossing.memory)));
+cleanup:
+    return status;
+}
+
+static bool has_lower_neighbour(const marcher *m) {
+    for (int k = 1; k < 8; ++k)
+        if (neighbour(m, -(k & 1), -(k >> 1 & 1), -(k >> 2)) < m->pieces.pieces)
+            return true;
+    return false;
+}
+
+/* Keeps the piece's faces for the neighbours below, which come later. */
+static ovoid_status keep_faces(ovoid_context *context, marcher *m, size_t piece) {
+    ovoid_status status = OVOID_OK;
+    const ov_brick_grid *const grid = &m->grid;
+    const size_t faces = grid->face_start[3];
+    const cl_uint count = (cl_uint)faces;
+    piece_faces *const kept = &m->faces[piece];
+    if (!has_lower_neighbour(m))
+        return OVOID_OK;
+    kept->value = ov_alloc(context, faces * OV_PACK, sizeof *kept->value, "values at faces");
+    kept->crossing =
+        ov_alloc(context, faces * CROSSING, sizeof *kept->crossing, "crossings at faces");
+    if (!kept->value || !kept->crossing)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(OV_LAUNCH(context, &m->get, faces, m->group, OV_ARG(count), OV_ARG(m->face_list.memory),
+                     OV_ARG(m->place.memory), OV_ARG(m->value.memory), OV_ARG(m->values.memory)));
+    OV_TRY(
+        ov_buffer_read(context, &m->values, 0, kept->value, faces * OV_PACK * sizeof *kept->value));
+    for (size_t k = 0; k < faces; ++k)
+        memcpy(kept->crossing + k * CROSSING, m->host_crossing + grid->face[k] * CROSSING,
+               CROSSING * sizeof *kept->crossing);
+cleanup:
+    return status;
+}
+
+static void drop_faces(piece_faces *faces) {
+    free(faces->value);
+    free(faces->crossing);
+    *faces = (piece_faces){0};
+}
+
+/* Drops the faces that no piece up to this one can need. */
+static void drop_old_faces(marcher *m, size_t piece) {
+    const uint64_t *const count = m->pieces.count;
+    const uint64_t furthest = (count[1] + 1) * count[0] + 1;
+    while (m->faces_end > 0 && m->pieces.key[m->faces_end - 1] > m->pieces.key[piece] + furthest)
+        drop_faces(&m->faces[--m->faces_end]);
+}
+
+/* ---- one piece ---------------------------------------------------------------------------- */
+
+static ovoid_status evaluate(ovoid_context *context, marcher *m, size_t piece) {
+    ovoid_status status = OVOID_OK;
+    const size_t first = m->pieces.start[piece], count = m->pieces.start[piece + 1] - first;
+    uint64_t key = m->pieces.key[piece];
+    for (int axis = 0; axis < 3; ++axis) {
+        m->at[axis] = key % m->pieces.count[axis];
+        key /= m->pieces.count[axis];
+        const int64_t index =
+            m->pieces.origin[axis] + (int64_t)(m->at[axis] * m->pieces.size[axis]);
+        m->corner[axis] = (double)index * m->pieces.spacing;
+    }
+    OV_TRY(ov_grow(context, &m->quadrics, &m->quadrics_capacity, count, sizeof *m->quadrics,
+                   "terms of a lattice piece"));
+    for (size_t k = 0; k < count; ++k)
+        m->quadrics[k] = m->bodies[m->pieces.term[first + k]].quadric;
+    OV_TRY(ov_terms_set(context, &m->terms, m->quadrics, count, m->corner,
+                        OV_MARCH_CUTOFF * m->options->isovalue));
+    m->lists.packs_only = true;
+    OV_TRY(ov_lists_build(context, &m->lists, &m->points, &m->terms, 0.0));
+    OV_TRY(ov_field(context, &m->operations, &m->points, &m->terms, &m->lists, &m->value));
+cleanup:
+    return status;
+}
+
+static size_t bits_in(cl_uint mask) {
+    size_t count = 0;
+    for (; mask; mask &= mask - 1)
+        ++count;
+    return count;
+}
+
+/* Numbers vertices and triangles along the curve, and lists the bricks that have some. */
+static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
+    const ov_brick_grid *const grid = &m->grid;
+    const uint64_t nx = grid->bricks[0], ny = grid->bricks[1];
+    size_t vertices = 0, triangles = 0;
+    m->active_count = 0;
+    for (size_t i = 0; i < grid->total; ++i) {
+        const uint32_t k = grid->curve[i];
+        const cl_uint brick = ov_brick_number(grid, k % nx, k / nx % ny, k / (nx * ny));
+        cl_uint *const crossing = m->host_crossing + (size_t)brick * CROSSING;
+        const size_t own = bits_in(crossing[1]) + bits_in(crossing[2]) + bits_in(crossing[3]);
+        crossing[0] = (cl_uint)(m->vertices + vertices);
+        if (own == 0 && m->host_count[k] == 0)
+            continue;
+        cl_uint *const entry = m->active + 4 * m->active_count++;
+        entry[0] = brick;
+        entry[1] = (cl_uint)vertices;
+        entry[2] = (cl_uint)triangles;
+        entry[3] = 0;
+        vertices += own;
+        triangles += m->host_count[k];
+    }
+    m->new_vertices = vertices;
+    m->new_triangles = triangles;
+    if (m->vertices + vertices > UINT32_MAX)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "the mesh has more than 2^32 vertices; use a larger spacing");
+    return OVOID_OK;
+}
+
+/* Signs, crossed edges, numbers. */
+static ovoid_status classify(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    const ov_brick_grid *const grid = &m->grid;
+    const cl_uint padded = (cl_uint)grid->padded_total, nx = (cl_uint)grid->bricks[0],
+                  ny = (cl_uint)grid->bricks[1], nz = (cl_uint)grid->bricks[2];
+    const cl_float isovalue = (cl_float)m->options->isovalue;
+    OV_TRY(OV_LAUNCH(context, &m->signs, (padded + m->run - 1) / m->run, m->group, OV_ARG(padded),
+                     OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->place.memory),
+                     OV_ARG(m->value.memory), OV_ARG(m->sign.memory)));
+    OV_TRY(OV_LAUNCH(context, &m->count, (grid->total + m->run - 1) / m->run, m->group, OV_ARG(nx),
+                     OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->sign.memory),
+                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
+                     OV_ARG(m->triangle_count.memory)));
+    OV_TRY(ov_buffer_read(context, &m->crossing, 0, m->host_crossing,
+                          grid->padded_total * CROSSING * sizeof *m->host_crossing));
+    OV_TRY(ov_buffer_read(context, &m->triangle_count, 0, m->host_count,
+                          grid->total * sizeof *m->host_count));
+    OV_TRY(number_bricks(context, m));
+cleanup:
+    return status;
+}
+
+/* Lattice coordinates within the piece and axis of an edge (see march_vertices()). */
+static cl_uint read_edge(cl_uint edge, cl_uint at[3]) {
+    at[0] = edge & 127u;
+    at[1] = edge >> 7 & 127u;
+    at[2] = edge >> 14 & 63u;
+    return edge >> 20 & 3u;
+}
+
+/* The box of each pack of vertices, wherever on their edges they come to lie. */
+static void box_packs(const marcher *m, size_t packs) {
+    for (size_t pack = 0; pack < packs; ++pack) {
+        float *const box = m->boxes + pack * BOX;
+        for (size_t j = 0; j < OV_PACK; ++j) {
+            cl_uint at[3];
+            const cl_uint along = read_edge(m->edges[pack * OV_PACK + j], at);
+            for (cl_uint axis = 0; axis < 3; ++axis) {
+                const float low = (float)(at[axis] * m->pieces.spacing);
+                const float high = (float)((at[axis] + (axis == along)) * m->pieces.spacing);
+                box[axis] = j == 0 ? low : fminf(box[axis], low);
+                box[axis + 3] = j == 0 ? high : fmaxf(box[axis + 3], high);
+            }
+        }
+    }
+}
+
+/* Edges and first positions of the piece's vertices; the last pack is filled up with its last. */
+static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    const size_t count = m->new_vertices, room = packs * OV_PACK;
+    const cl_uint active = (cl_uint)m->active_count, nx = (cl_uint)m->grid.bricks[0],
+                  ny = (cl_uint)m->grid.bricks[1];
+    const cl_float isovalue = (cl_float)m->options->isovalue;
+    const cl_int logarithmic = m->options->vertices == OVOID_VERTEX_EXACT;
+    OV_TRY(ov_buffer_reserve(context, &m->edge, room * sizeof(cl_uint), "edges of vertices"));
+    OV_TRY(ov_buffer_reserve(context, &m->t, room * sizeof(cl_float), "vertices"));
+    OV_TRY(OV_LAUNCH(context, &m->fill_vertices, m->active_count, m->group, OV_ARG(active),
+                     OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(isovalue),
+                     OV_ARG(logarithmic), OV_ARG(m->place.memory), OV_ARG(m->value.memory),
+                     OV_ARG(m->crossing.memory), OV_ARG(m->edge.memory), OV_ARG(m->t.memory)));
+    OV_TRY(ov_grow(context, &m->edges, &m->edges_capacity, room, sizeof *m->edges, "vertices"));
+    OV_TRY(
+        ov_grow(context, &m->refined, &m->refined_capacity, room, sizeof *m->refined, "vertices"));
+    OV_TRY(ov_buffer_read(context, &m->edge, 0, m->edges, count * sizeof *m->edges));
+    OV_TRY(ov_buffer_read(context, &m->t, 0, m->refined, count * sizeof *m->refined));
+    for (size_t k = count; k < room; ++k) {
+        m->edges[k] = m->edges[count - 1];
+        m->refined[k] = m->refined[count - 1];
+    }
+    OV_TRY(ov_buffer_write(context, &m->edge, 0, m->edges, room * sizeof *m->edges));
+    OV_TRY(ov_buffer_write(context, &m->t, 0, m->refined, room * sizeof *m->refined));
+cleanup:
+    return status;
+}
+
+/* Lists of the terms that reach the packs of vertices. */
+static ovoid_status list_terms(ovoid_context *context, marcher *m, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    ov_points points = {.count = packs * OV_PACK, .packs = packs};
+    float *tree = NULL;
+    size_t floats = 0;
+    OV_TRY(ov_grow(context, &m->boxes, &m->boxes_capacity, packs * BOX, sizeof *m->boxes,
+                   "boxes of vertices"));
+    box_packs(m, packs);
+    OV_TRY(ov_tree_build(context, m->boxes, packs, &points.tree, &tree, &floats));
+    OV_TRY(ov_buffer_put(context, &points.boxes, tree, floats * sizeof *tree, "boxes of vertices"));
+    OV_TRY(ov_lists_build(context, &m->lists, &points, &m->terms, 0.0));
+cleanup:
+    free(tree);
+    ov_points_destroy(&points);
+    return status;
+}
+
+static ovoid_status refine(ovoid_context *context, marcher *m, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
+    const cl_uint packs_count = (cl_uint)packs;
+    const cl_uint steps = m->options->vertices == OVOID_VERTEX_EXACT ? REFINE_STEPS : 0;
+    const cl_float spacing = (cl_float)m->pieces.spacing, isovalue = (cl_float)m->options->isovalue,
+                   close = (cl_float)REFINE_CLOSE;
+    OV_TRY(ov_device_get(context, &device));
+    OV_TRY(
+        ov_buffer_reserve(context, &m->normal, packs * 3 * OV_PACK * sizeof(cl_float), "normals"));
+    OV_TRY(OV_LAUNCH(context, &m->refine, packs * device->shape.lanes, m->group,
+                     OV_ARG(packs_count), OV_ARG(spacing), OV_ARG(isovalue), OV_ARG(steps),
+                     OV_ARG(close), OV_ARG(m->edge.memory), OV_ARG(m->lists.pack_start.memory),
+                     OV_ARG(m->lists.pack_item.memory), OV_ARG(m->terms.device.memory),
+                     OV_ARG(m->t.memory), OV_ARG(m->normal.memory)));
+cleanup:
+    return status;
+}
+
+static ovoid_status grow_vertices(ovoid_context *context, marcher *m, size_t total) {
+    ovoid_status status = OVOID_OK;
+    if (m->origin)
+        OV_TRY(ov_grow(context, &m->offsets, &m->offsets_capacity, 3 * total, sizeof *m->offsets,
+                       "vertices"));
+    else
+        OV_TRY(ov_grow(context, &m->xyz, &m->xyz_capacity, 3 * total, sizeof *m->xyz, "vertices"));
+    if (!m->origin)
+        OV_TRY(ov_grow(context, &m->edge_of, &m->edge_of_capacity, total, sizeof *m->edge_of,
+                       "vertices"));
+    OV_TRY(ov_grow(context, &m->normals, &m->normals_capacity, 3 * total, sizeof *m->normals,
+                   "normals"));
+cleanup:
+    return status;
+}
+
+static void put_coordinate(marcher *m, size_t at, double value) {
+    if (m->origin)
+        m->offsets[at] = (float)(value - m->origin[at % 3]);
+    else
+        m->xyz[at] = value;
+}
+
+/* Appends the piece's vertices to the mesh. */
+static ovoid_status take_vertices(ovoid_context *context, marcher *m, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    const size_t values = packs * OV_PACK, total = m->vertices + m->new_vertices;
+    OV_TRY(ov_grow(context, &m->refined, &m->refined_capacity, 4 * values, sizeof *m->refined,
+                   "vertices"));
+    OV_TRY(grow_vertices(context, m, total));
+    float *const t = m->refined, *const normal = t + values;
+    OV_TRY(ov_buffer_read(context, &m->t, 0, t, values * sizeof *t));
+    OV_TRY(ov_buffer_read(context, &m->normal, 0, normal, 3 * values * sizeof *normal));
+    for (size_t k = 0; k < m->new_vertices; ++k) {
+        const size_t to = 3 * (m->vertices + k);
+        const float *const n = normal + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
+        cl_uint at[3];
+        const cl_uint along = read_edge(m->edges[k], at);
+        if (m->edge_of)
+            m->edge_of[m->vertices + k] = (uint8_t)along;
+        for (cl_uint axis = 0; axis < 3; ++axis) {
+            const int64_t index =
+                m->pieces.origin[axis] + (int64_t)(m->at[axis] * m->pieces.size[axis] + at[axis]);
+            const double within = axis == along ? (double)t[k] : 0.0;
+            put_coordinate(m, to + axis, ((double)index + within) * m->pieces.spacing);
+            m->normals[to + axis] = n[axis * OV_PACK];
+        }
+    }
+cleanup:
+    return status;
+}
+
+static ovoid_status take_triangles(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    const size_t corners = 3 * m->new_triangles, before = 3 * m->triangles;
+    const cl_uint active = (cl_uint)m->active_count, nx = (cl_uint)m->grid.bricks[0],
+                  ny = (cl_uint)m->grid.bricks[1];
+    OV_TRY(ov_grow(context, &m->triangle, &m->triangle_capacity, before + corners,
+                   sizeof *m->triangle, "triangles"));
+    OV_TRY(ov_buffer_reserve(context, &m->corners, corners * sizeof(cl_uint), "triangles"));
+    OV_TRY(OV_LAUNCH(context, &m->fill_triangles, m->active_count, m->group, OV_ARG(active),
+                     OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(m->sign.memory),
+                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
+                     OV_ARG(m->corners.memory)));
+    OV_TRY(ov_buffer_read(context, &m->corners, 0, m->triangle + before,
+                          corners * sizeof *m->triangle));
+    m->triangles += m->new_triangles;
+cleanup:
+    return status;
+}
+
+/* The current piece's part of the mesh. */
+static ovoid_status take_piece(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    const size_t packs = (m->new_vertices + OV_PACK - 1) / OV_PACK;
+    if (m->active_count == 0)
+        return OVOID_OK;
+    OV_TRY(ov_buffer_put(context, &m->list, m->active, m->active_count * 4 * sizeof *m->active,
+                         "bricks at the surface"));
+    OV_TRY(ov_buffer_write(context, &m->crossing, 0, m->host_crossing,
+                           m->grid.padded_total * CROSSING * sizeof *m->host_crossing));
+    OV_TRY(take_triangles(context, m));
+    if (m->new_vertices > 0) {
+        OV_TRY(fill_vertices(context, m, packs));
+        OV_TRY(list_terms(context, m, packs));
+        OV_TRY(refine(context, m, packs));
+        OV_TRY(take_vertices(context, m, packs));
+    }
+    m->vertices += m->new_vertices;
+cleanup:
+    return status;
+}
+
+/* For the message about a surface that is not there. */
+static ovoid_status note_largest(ovoid_context *context, marcher *m) {
+    const size_t count = m->points.count;
+    float *const values = ov_alloc(context, count, sizeof *values, "lattice values");
+    if (!values)
+        return OVOID_ERROR_MEMORY;
+    const ovoid_status status =
+        ov_buffer_read(context, &m->value, 0, values, count * sizeof *values);
+    for (size_t k = 0; k < count && status == OVOID_OK; ++k)
+        m->largest = fmaxf(m->largest, values[k]);
+    free(values);
+    return status;
+}
+
+static ovoid_status fail_empty(ovoid_context *context, const marcher *m) {
+    if (m->pieces.pieces == 0)
+        return ov_fail(context, OVOID_ERROR_EMPTY,
+                       "no surface: the field is nowhere above the isovalue %g",
+                       m->options->isovalue);
+    return ov_fail(context, OVOID_ERROR_EMPTY,
+                   "no surface: the largest value of the field at a lattice point is %g, and the "
+                   "isovalue %g; use a smaller isovalue or spacing (now %g angstrom)",
+                   (double)m->largest, m->options->isovalue, m->options->spacing);
+}
+
+/* From the highest down, so that the neighbours above have been there. */
+static ovoid_status march_pieces(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    for (size_t piece = m->pieces.pieces; piece-- > 0;) {
+        const size_t pieces = m->pieces.pieces;
+        if (m->watch)
+            OV_TRY(ov_watch_ask(context, m->watch));
+        else
+            OV_TRY(ov_progress_step(context, pieces - 1 - piece, pieces));
+        drop_old_faces(m, piece);
+        OV_TRY(evaluate(context, m, piece));
+        OV_TRY(fill_ghosts(context, m));
+        OV_TRY(classify(context, m));
+        OV_TRY(take_piece(context, m));
+        OV_TRY(keep_faces(context, m, piece));
+        if (m->vertices == 0)
+            OV_TRY(note_largest(context, m));
+    }
+cleanup:
+    return status;
+}
+
+static double coordinate(const marcher *m, size_t vertex, size_t axis) {
+    return m->origin ? (double)m->offsets[3 * vertex + axis] : m->xyz[3 * vertex + axis];
+}
+
+/* ---- what the lattice does not meet ------------------------------------------------------- */
+
+static void vertex_at(size_t vertex, double xyz[3], const void *user) {
+    const marcher *const m = user;
+    for (size_t k = 0; k < 3; ++k)
+        xyz[k] = coordinate(m, vertex, k) + (m->origin ? m->origin[k] : 0.0);
+}
+
+/* Drops the vertices that are replaced, and their triangles. `number` becomes the new ones. */
+static void drop_replaced(marcher *m, const bool *replaced, uint32_t *number) {
+    size_t kept = 0, triangles = 0;
+    for (size_t v = 0; v < m->vertices; ++v) {
+        if (replaced[v])
+            continue;
+        for (size_t k = 0; k < 3; ++k) {
+            if (m->origin)
+                m->offsets[3 * kept + k] = m->offsets[3 * v + k];
+            else
+                m->xyz[3 * kept + k] = m->xyz[3 * v + k];
+            m->normals[3 * kept + k] = m->normals[3 * v + k];
+        }
+        if (m->edge_of)
+            m->edge_of[kept] = m->edge_of[v];
+        number[v] = (uint32_t)kept++;
+    }
+    for (size_t t = 0; t < m->triangles; ++t) {
+        const uint32_t *const from = m->triangle + 3 * t;
+        if (replaced[from[0]])
+            continue;
+        for (size_t k = 0; k < 3; ++k)
+            m->triangle[3 * triangles + k] = number[from[k]];
+        ++triangles;
+    }
+    m->vertices = kept;
+    m->triangles = triangles;
+}
+
+static ovoid_status append_specks(ovoid_context *context, marcher *m, const ov_specks *specks) {
+    ovoid_status status = OVOID_OK;
+    const size_t total = m->vertices + specks->vertices, corners = 3 * m->triangles;
+    if (total > UINT32_MAX)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "the mesh has more than 2^32 vertices; use a larger spacing");
+    OV_TRY(grow_vertices(context, m, total));
+    OV_TRY(ov_grow(context, &m->triangle, &m->triangle_capacity, corners + 3 * specks->triangles,
+                   sizeof *m->triangle, "triangles"));
+    for (size_t k = 0; k < 3 * specks->vertices; ++k) {
+        put_coordinate(m, 3 * m->vertices + k, specks->xyz[k]);
+        m->normals[3 * m->vertices + k] = specks->normals[k];
+    }
+    if (m->edge_of)
+        memcpy(m->edge_of + m->vertices, specks->edge, specks->vertices);
+    for (size_t k = 0; k < 3 * specks->triangles; ++k)
+        m->triangle[corners + k] = (uint32_t)m->vertices + specks->corners[k];
+    m->vertices = total;
+    m->triangles += specks->triangles;
+cleanup:
+    return status;
+}
+
+static ovoid_status add_specks(ovoid_context *context, marcher *m, size_t count) {
+    ovoid_status status = OVOID_OK;
+    ov_specks specks = {0};
+    uint32_t *number = NULL;
+    bool *const replaced = ov_alloc(context, m->vertices, sizeof *replaced, "vertices");
+    const ov_lattice_mesh lattice = {.at = vertex_at,
+                                     .user = m,
+                                     .corners = m->triangle,
+                                     .vertices = m->vertices,
+                                     .triangles = m->triangles,
+                                     .replaced = replaced};
+    if (!replaced)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_specks_find(context, m->bodies, count, m->options,
+                          OV_MARCH_CUTOFF * m->options->isovalue, &lattice, &specks));
+    m->missed = specks.missed;
+    if (specks.vertices == 0)
+        goto cleanup;
+    number = ov_alloc(context, m->vertices, sizeof *number, "vertices");
+    if (!number) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    drop_replaced(m, replaced, number);
+    OV_TRY(append_specks(context, m, &specks));
+cleanup:
+    free(number);
+    free(replaced);
+    ov_specks_destroy(&specks);
+    return status;
+}
+
+/* ---- normals where the gradient vanishes -------------------------------------------------- */
+
+static bool vanishes(const float normal[3]) {
+    return normal[0] == 0.0f && normal[1] == 0.0f && normal[2] == 0.0f;
+}
+
+/* Twice a triangle's area times its normal. */
+static void triangle_normal(const marcher *m, const uint32_t corner[3], double normal[3]) {
+    double u[3], v[3];
+    for (size_t k = 0; k < 3; ++k) {
+        const double from = coordinate(m, corner[0], k);
+        u[k] = coordinate(m, corner[1], k) - from;
+        v[k] = coordinate(m, corner[2], k) - from;
+    }
+    for (int k = 0; k < 3; ++k)
+        normal[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+}
+
+/* Gives a vertex the mean normal of its triangles, or any unit vector if they have no area. */
+static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
+    size_t missing = 0;
+    for (size_t k = 0; k < m->vertices; ++k)
+        missing += vanishes(m->normals + 3 * k);
+    if (missing == 0)
+        return OVOID_OK;
+    double *const sums = ov_alloc(context, 3 * m->vertices, sizeof *sums, "normals");
+    if (!sums)
+        return OVOID_ERROR_MEMORY;
+    for (size_t k = 0; k < m->triangles; ++k) {
+        double normal[3];
+        triangle_normal(m, m->triangle + 3 * k, normal);
+        for (int corner = 0; corner < 3; ++corner)
+            for (int axis = 0; axis < 3; ++axis)
+                sums[3 * (size_t)m->triangle[3 * k + (size_t)corner] + (size_t)axis] +=
+                    normal[axis];
+    }
+    for (size_t k = 0; k < m->vertices; ++k) {
+        const double *const s = sums + 3 * k;
+        float *const normal = m->normals + 3 * k;
+        const double length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+        if (!vanishes(normal))
+            continue;
+        normal[2] = 1.0f;
+        for (int axis = 0; axis < 3 && length > 0.0; ++axis)
+            normal[axis] = (float)(s[axis] / length);
+    }
+    free(sums);
+    return OVOID_OK;
+}
+
+/* ---- all of it ---------------------------------------------------------------------------- */
+
+/* Frees all but the mesh. */
+static void release_work(marcher *m) {
+    ov_buffer *const buffers[] = {&m->value,  &m->sign,    &m->crossing,  &m->triangle_count,
+                                  &m->cases,  &m->list,    &m->edge,      &m->t,
+                                  &m->normal, &m->corners, &m->face_list, &m->ghost_list,
+                                  &m->place,  &m->values,  &m->crossings};
+    ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
+                                  &m->fill_vertices, &m->fill_triangles, &m->refine};
+    void *const memory[] = {m->quadrics,    m->host_crossing,  m->host_count,
+                            m->ghost_value, m->ghost_crossing, m->active,
+                            m->edges,       m->boxes,          m->refined};
+    for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
+        ov_buffer_destroy(buffers[k]);
+    for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
+        ov_kernel_destroy(kernels[k]);
+    for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
+        free(memory[k]);
+    m->quadrics = NULL;
+    m->host_crossing = m->host_count = m->ghost_crossing = m->active = m->edges = NULL;
+    m->ghost_value = m->boxes = m->refined = NULL;
+    for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
+        drop_faces(&m->faces[k]);
+    free(m->faces);
+    m->faces = NULL;
+    ov_brick_grid_destroy(&m->grid);
+    ov_pieces_destroy(&m->pieces);
+    ov_points_destroy(&m->points);
+    ov_terms_destroy(&m->terms);
+    ov_lists_destroy(&m->lists);
+    ov_operations_destroy(&m->operations);
+}
+
+static void destroy_marcher(marcher *m) {
+    release_work(m);
+    free(m->xyz);
+    free(m->offsets);
+    free(m->edge_of);
+    free(m->normals);
+    free(m->triangle);
+}
+
+/* Gives back what growing has taken too much. */
+static void shrink(void *array_pointer, size_t bytes) {
+    void *array, *less;
+    memcpy(&array, array_pointer, sizeof array);
+    less = array && bytes > 0 ? realloc(array, bytes) : NULL;
+    if (less)
+        memcpy(array_pointer, &less, sizeof less);
+}
+
+/* Hands the arrays over. */
+static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh) {
+    shrink(&m->xyz, 3 * m->vertices * sizeof *m->xyz);
+    shrink(&m->offsets, 3 * m->vertices * sizeof *m->offsets);
+    shrink(&m->normals, 3 * m->vertices * sizeof *m->normals);
+    shrink(&m->triangle, 3 * m->triangles * sizeof *m->triangle);
+    const ovoid_status status =
+        m->origin ? ov_mesh_adopt_light(context, m->offsets, m->origin, m->normals, m->vertices,
+                                        m->triangle, m->triangles, mesh)
+                  : ov_mesh_adopt(context, m->xyz, m->normals, m->vertices, m->triangle,
+                                  m->triangles, mesh);
+    m->xyz = NULL;
+    m->offsets = m->normals = NULL;
+    m->triangle = NULL;
+    if (status != OVOID_OK)
+        return status;
+    (*mesh)->along_curve = true;
+    (*mesh)->spacing = m->options->spacing;
+    (*mesh)->missed = m->missed;
+    (*mesh)->edge = m->edge_of;
+    m->edge_of = NULL;
+    return OVOID_OK;
+}
+
+/* Where there are so many more pieces than ones with a surface, smaller pieces are tried; and what
+ * a piece costs beside its points, in points. */
+#define EMPTY_SHARE 8.0
+#define OVERHEAD 5e4
+static const uint64_t sparse_limits[][3] = {{64, 64, 32}, {32, 32, 16}, {16, 16, 8}};
+
+static double cost_of(const ov_pieces *pieces) {
+    return (double)pieces->pieces *
+           (OVERHEAD + (double)pieces->size[0] * (double)pieces->size[1] * (double)pieces->size[2]);
+}
+
+/* Cuts the lattice into pieces: small ones where terms are few and far apart. */
+static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
+                         const uint64_t limit[3]) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_mesh_options *const o = m->options;
+    const double cutoff = OV_MARCH_CUTOFF * o->isovalue;
+    ov_pieces *const best = &m->pieces;
+    OV_TRY(
+        ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit, best));
+    if ((double)best->count[0] * (double)best->count[1] * (double)best->count[2] <=
+        EMPTY_SHARE * (double)best->pieces)
+        goto cleanup;
+    for (size_t k = 0; k < sizeof sparse_limits / sizeof *sparse_limits; ++k) {
+        ov_pieces other;
+        OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing,
+                                sparse_limits[k], &other));
+        if (cost_of(&other) < cost_of(best)) {
+            const ov_pieces swap = *best;
+            *best = other;
+            other = swap;
+        }
+        ov_pieces_destroy(&other);
+    }
+cleanup:
+    return status;
+}
+
+static ovoid_status march(ovoid_context *context, const ov_body *bodies, size_t count,
+                          const ovoid_mesh_options *options, const uint64_t limit[3],
+                          const double *origin, const ov_watch *watch, bool specks,
+                          ovoid_mesh **mesh) {
+    ovoid_status status = OVOID_OK;
+    marcher m = {.bodies = bodies, .options = options, .origin = origin, .watch = watch};
+    OV_TRY(plan(context, &m, count, limit));
+    if (m.pieces.pieces > 0)
+        OV_TRY(set_up(context, &m));
+    OV_TRY(march_pieces(context, &m));
+    if (specks && m.pieces.pieces > 0)
+        OV_TRY(add_specks(context, &m, count));
+    if (m.vertices == 0)
+        OV_TRY(fail_empty(context, &m));
+    OV_TRY(mend_normals(context, &m));
+    release_work(&m); /* what is left is the mesh */
+    OV_TRY(adopt(context, &m, mesh));
+cleanup:
+    destroy_marcher(&m);
+    return status;
+}
+
+ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
+                      const ovoid_mesh_options *options, const uint64_t limit[3],
+                      ovoid_mesh **mesh) {
+    return march(context, bodies, count, options, limit, NULL, NULL, false, mesh);
+}
+
+ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, const uint64_t limit[3],
+                            const double origin[3], const ov_watch *watch, ovoid_mesh **mesh) {
+    return march(context, bodies, count, options, limit, origin, watch, false, mesh);
+}
+
+static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
+
+ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, ovoid_mesh **mesh) {
+    ovoid_mesh *made = NULL;
+    const ovoid_status status =
+        march(context, bodies, count, options, piece_limit, NULL, NULL, true, &made);
+    if (status != OVOID_OK)
+        return status;
+    if (made->missed > 0)
+        ov_warn(
+            context,
+            "%zu atom%s or ellipsoid%s make%s a surface too small or too thin for the spacing of "
+            "%g angstrom, which the mesh may lack; use a smaller one",
+            made->missed, made->missed == 1 ? "" : "s", made->missed == 1 ? "" : "s",
+            made->missed == 1 ? "s" : "", options->spacing);
+    *mesh = made;
+    return OVOID_OK;
+}
+
+ovoid_status ov_mesh_bodies_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                                  const ovoid_mesh_options *options, const double origin[3],
+                                  const ov_watch *watch, ovoid_mesh **mesh) {
+    return march(context, bodies, count, options, piece_limit, origin, watch, true, mesh);
+}

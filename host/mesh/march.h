@@ -1,0 +1,42 @@
+/*
+ * Marching cubes on the device: from the terms of a field to a mesh.
+ */
+#ifndef OV_MARCH_H
+#define OV_MARCH_H
+
+#include "mesh/mesh.h"
+#include "mesh/pieces.h"
+#include "ovoid/surface.h"
+
+/* Lattice points of a piece, per axis, at most: a million, 16 MB on the device. Multiples of the
+ * bricks' sides. The kernels' names of edges hold no more. */
+#define OV_MARCH_PIECE                                                                             \
+    { 128, 128, 64 }
+
+/* A vertex keeps this far from the ends of its edge, in lattice steps (see kernels/march.cl). */
+#define OV_EDGE_MARGIN 7.62939453125e-6
+
+/* Terms count where they are at least this share of the isovalue. */
+#define OV_MARCH_CUTOFF 1e-7
+
+/* The mesh of phi = isovalue. Vertices are numbered piece by piece from the highest piece down, in
+ * a piece along a space-filling curve of its bricks. options are valid; limit as OV_MARCH_PIECE, or
+ * less in tests. OVOID_ERROR_EMPTY when no lattice point is inside. */
+ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
+                      const ovoid_mesh_options *options, const uint64_t limit[3],
+                      ovoid_mesh **mesh);
+
+/* As ov_march(), a light mesh (see mesh.h) about this origin. The watch is asked
+ * before each piece; where it is NULL, the context. */
+ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, const uint64_t limit[3],
+                            const double origin[3], const ov_watch *watch, ovoid_mesh **mesh);
+
+/* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). */
+ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
+                            const ovoid_mesh_options *options, ovoid_mesh **mesh);
+ovoid_status ov_mesh_bodies_light(ovoid_context *context, const ov_body *bodies, size_t count,
+                                  const ovoid_mesh_options *options, const double origin[3],
+                                  const ov_watch *watch, ovoid_mesh **mesh);
+
+#endif

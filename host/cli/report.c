@@ -156,8 +156,16 @@ static void add_profile(builder *b, const fit_job *job) {
         add_number(&profile, "field_passes", (double)spent->field_passes);
         add_number(&profile, "moments_passes", (double)spent->moments_passes);
     }
-    add_number(&profile, "launches", (double)spent->launches);
-    b->good = profile.good;
+    const uint64_t counts[CLI_COUNTS] = {
+        [OVOID_COUNT_LAUNCHES] = spent->launches,
+        [OVOID_COUNT_BLOCKING_READS] = spent->blocking_reads,
+        [OVOID_COUNT_BLOCKING_WRITES] = spent->blocking_writes,
+        [OVOID_COUNT_BYTES_TO_DEVICE] = spent->bytes_to_device,
+        [OVOID_COUNT_BYTES_FROM_DEVICE] = spent->bytes_from_device,
+        [OVOID_COUNT_BUFFERS_CREATED] = spent->buffers_created,
+        [OVOID_COUNT_KERNELS_CREATED] = spent->kernels_created,
+    };
+    b->good = profile.good && cli_counts_report(counts, profile.object);
 }
 
 cJSON *fit_report_make(const fit_job *job) {

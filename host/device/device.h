@@ -23,7 +23,11 @@ typedef struct ov_shape {
  * 8, 16, L a power of two, V * L a divisor of OV_PACK OVOID_KERNEL_DIR  folder with the kernel
  * sources, all of them, instead of the embedded ones OVOID_CACHE       auto (default), on or off:
  * whether compiled programs are kept. auto leaves that to drivers with a cache of their own (PoCL)
- *   OVOID_CACHE_DIR   where they are kept, instead of $XDG_CACHE_HOME/ovoid or ~/.cache/ovoid */
+ *   OVOID_CACHE_DIR   where they are kept, instead of $XDG_CACHE_HOME/ovoid or ~/.cache/ovoid
+ *   OVOID_POOL        off: buffers are created as large as asked for, and released at once, for
+ *                     simulators that look for accesses beyond a buffer's end */
+
+typedef struct ov_pool ov_pool; /* buffers kept for the next that need one (pool.c) */
 
 typedef struct ov_device {
     ovoid_device_info info;
@@ -32,14 +36,20 @@ typedef struct ov_device {
     cl_context context;
     cl_command_queue queue; /* in order */
     ov_shape shape;
-    size_t max_group;            /* largest work-group */
-    uint64_t launches;           /* kernels enqueued since the device was opened */
+    size_t max_group;  /* largest work-group */
+    uint64_t launches; /* kernels enqueued since the device was opened, and so on, as
+                          ovoid_count says */
+    uint64_t blocking_reads, blocking_writes;
+    uint64_t bytes_to_device, bytes_from_device;
+    uint64_t buffers_created, kernels_created;
     struct ov_program *programs; /* built so far, a list */
-    uint32_t built;              /* programs compiled from source so far */
-    uint32_t loaded;             /* programs taken from the cache so far */
-    bool cache_told;             /* the user knows that the cache does not work */
-    struct ov_profile *profile;  /* times of kernels; NULL until ovoid_context_profile() */
-    unsigned char *staged;       /* copies of small writes under way; NULL before the first */
+    struct ov_made *made;        /* kernels made so far, a list */
+    ov_pool *pool;
+    uint32_t built;             /* programs compiled from source so far */
+    uint32_t loaded;            /* programs taken from the cache so far */
+    bool cache_told;            /* the user knows that the cache does not work */
+    struct ov_profile *profile; /* times of kernels; NULL until ovoid_context_profile() */
+    unsigned char *staged;      /* copies of small writes under way; NULL before the first */
     size_t staged_bytes;
 } ov_device;
 
@@ -48,6 +58,11 @@ ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
 
 /* Releases programs, queue and device; nothing happens when none is open. */
 void ov_device_close(ovoid_context *context);
+
+/* Fills in what the device has counted, less what it had counted `before` (NULL: nothing): launches
+ * and what follows in the structure. The rest of it stays. */
+void ov_device_counted(const ov_device *device, const ovoid_fit_profile *before,
+                       ovoid_fit_profile *profile);
 
 /* A kernel. `name` and `program` are string constants. */
 typedef struct ov_kernel {
@@ -62,7 +77,10 @@ typedef struct ov_kernel {
  * the embedded source, or from the folder OVOID_KERNEL_DIR when that is set) and keeping it with
  * the device. On PoCL all embedded files are built as one program: no two kernels, functions or
  * macros of theirs may share a name. Build options: -cl-std=CL1.2, the shape, -DOV_PACK, and never
- * a relaxed-math flag. */
+ * a relaxed-math flag.
+ *
+ * A kernel is made once for a device and kept with it: all that ask for it share the handle, whose
+ * arguments each launch sets anew. Like all of a context, it belongs to one thread at a time. */
 ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const char *name,
                               ov_kernel *kernel);
 void ov_kernel_destroy(ov_kernel *kernel);
@@ -91,11 +109,13 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
 /* A device buffer that remembers its size. {0} is an empty one. */
 typedef struct ov_buffer {
     cl_mem memory;
-    size_t bytes; /* allocated */
+    size_t bytes;  /* allocated */
+    ov_pool *pool; /* where it goes when it is destroyed */
 } ov_buffer;
 
 /* Makes the buffer at least `bytes` large (never zero), growing geometrically; contents are lost
- * when it grows. `what` names it in errors. Beyond the device's max_allocation: OVOID_ERROR_LIMIT.
+ * when it grows, and what a new one holds is arbitrary. `what` names it in errors. Beyond the
+ * device's max_allocation: OVOID_ERROR_LIMIT.
  */
 ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t bytes,
                                const char *what);

@@ -28,6 +28,13 @@ static ovoid_status check_launch(ovoid_context *context, const ov_kernel *kernel
     return OVOID_OK;
 }
 
+/* Drivers that give a buffer its memory when it is first used find out only then that there is
+ * none left. Buffers that are kept are released for its sake; true: it is worth another try. */
+static bool made_room(ov_device *device, cl_int code) {
+    return code == CL_MEM_OBJECT_ALLOCATION_FAILURE && ov_pool_empty(device->pool) &&
+           clFinish(device->queue) == CL_SUCCESS;
+}
+
 ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t global, size_t local,
                        const ov_arg *args, size_t arg_count) {
     if (!global)
@@ -53,8 +60,11 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     if ((status = ov_profile_prepare(context, context->device, &timed)) != OVOID_OK)
         return status;
     cl_event event = NULL;
-    cl_int code = clEnqueueNDRangeKernel(context->device->queue, kernel->handle, 1, NULL, &global,
-                                         local ? &local : NULL, 0, NULL, timed ? &event : NULL);
+    cl_int code;
+    do
+        code = clEnqueueNDRangeKernel(context->device->queue, kernel->handle, 1, NULL, &global,
+                                      local ? &local : NULL, 0, NULL, timed ? &event : NULL);
+    while (made_room(context->device, code));
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueNDRangeKernel", kernel->name);
     context->device->launches++;
@@ -82,9 +92,13 @@ ovoid_status ov_finish(ovoid_context *context) {
 static cl_int allocate(ov_device *device, ov_buffer *buffer, size_t bytes) {
     cl_int code;
     cl_mem memory = clCreateBuffer(device->context, CL_MEM_READ_WRITE, bytes, NULL, &code);
-    if (code == CL_SUCCESS)
-        *buffer = (ov_buffer){memory, bytes};
-    return code;
+    if (code != CL_SUCCESS && ov_pool_empty(device->pool) && clFinish(device->queue) == CL_SUCCESS)
+        memory = clCreateBuffer(device->context, CL_MEM_READ_WRITE, bytes, NULL, &code);
+    if (code != CL_SUCCESS)
+        return code;
+    ov_pool_own(device->pool, memory, bytes, buffer);
+    device->buffers_created++;
+    return CL_SUCCESS;
 }
 
 ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t bytes,
@@ -110,6 +124,10 @@ ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t
     if (room > limit)
         room = bytes ? bytes : 1;
     ov_buffer_destroy(buffer);
+    if (ov_pool_take(device->pool, room, buffer))
+        return OVOID_OK;
+    if (ov_pool_size(device->pool, room) <= limit)
+        room = ov_pool_size(device->pool, room);
     cl_int code = allocate(device, buffer, room);
     if (code != CL_SUCCESS && bytes && room > bytes)
         code = allocate(device, buffer, bytes);
@@ -125,7 +143,7 @@ void ov_buffer_destroy(ov_buffer *buffer) {
     if (!buffer)
         return;
     if (buffer->memory)
-        clReleaseMemObject(buffer->memory);
+        ov_pool_put(buffer);
     *buffer = (ov_buffer){0};
 }
 
@@ -161,11 +179,16 @@ ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t o
     if (status != OVOID_OK)
         return status;
     const void *copy = stage(context->device, data, bytes);
-    cl_int code =
-        clEnqueueWriteBuffer(context->device->queue, buffer->memory, copy ? CL_FALSE : CL_TRUE,
-                             offset, bytes, copy ? copy : data, 0, NULL, NULL);
+    cl_int code;
+    do
+        code =
+            clEnqueueWriteBuffer(context->device->queue, buffer->memory, copy ? CL_FALSE : CL_TRUE,
+                                 offset, bytes, copy ? copy : data, 0, NULL, NULL);
+    while (made_room(context->device, code));
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
+    context->device->bytes_to_device += bytes;
+    context->device->blocking_writes += !copy;
     return copy ? OVOID_OK : idle(context);
 }
 
@@ -182,8 +205,14 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
     ovoid_status status = check_range(context, buffer, offset, bytes);
     if (status != OVOID_OK)
         return status;
-    cl_int code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
-                                      bytes, data, 0, NULL, NULL);
-    return code == CL_SUCCESS ? idle(context)
-                              : ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+    cl_int code;
+    do
+        code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_TRUE, offset, bytes,
+                                   data, 0, NULL, NULL);
+    while (made_room(context->device, code));
+    if (code != CL_SUCCESS)
+        return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+    context->device->bytes_from_device += bytes;
+    context->device->blocking_reads++;
+    return idle(context);
 }

@@ -213,6 +213,7 @@ static void release(ov_device *device) {
     if (!device)
         return;
     ov_programs_release(device);
+    ov_pool_close(device->pool);
     if (device->queue) {
         clFinish(device->queue);
         ov_profile_release(device);
@@ -259,6 +260,10 @@ static ovoid_status make_device(ovoid_context *context, const ov_device_entry *e
         status = ov_cl_fail_on(context, code, call, NULL, name);
         goto cleanup;
     }
+    if (!(device->pool = ov_pool_create(context, device->info.global_memory))) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
     OV_TRY(set_shape(context, device));
     if (context->profile)
         OV_TRY(ov_profile_start(context, device));
@@ -292,6 +297,44 @@ cleanup:
 
 const ovoid_device_info *ovoid_context_device(const ovoid_context *context) {
     return context && context->device ? &context->device->info : NULL;
+}
+
+/* ---- counts ------------------------------------------------------------------------------- */
+
+uint64_t ovoid_context_count(const ovoid_context *context, ovoid_count what) {
+    const ov_device *const device = context ? context->device : NULL;
+    if (!device)
+        return 0;
+    switch (what) {
+    case OVOID_COUNT_LAUNCHES:
+        return device->launches;
+    case OVOID_COUNT_BLOCKING_READS:
+        return device->blocking_reads;
+    case OVOID_COUNT_BLOCKING_WRITES:
+        return device->blocking_writes;
+    case OVOID_COUNT_BYTES_TO_DEVICE:
+        return device->bytes_to_device;
+    case OVOID_COUNT_BYTES_FROM_DEVICE:
+        return device->bytes_from_device;
+    case OVOID_COUNT_BUFFERS_CREATED:
+        return device->buffers_created;
+    case OVOID_COUNT_KERNELS_CREATED:
+        return device->kernels_created;
+    }
+    return 0;
+}
+
+void ov_device_counted(const ov_device *device, const ovoid_fit_profile *before,
+                       ovoid_fit_profile *profile) {
+    static const ovoid_fit_profile nothing = {0};
+    const ovoid_fit_profile *const from = before ? before : &nothing;
+    profile->launches = device->launches - from->launches;
+    profile->blocking_reads = device->blocking_reads - from->blocking_reads;
+    profile->blocking_writes = device->blocking_writes - from->blocking_writes;
+    profile->bytes_to_device = device->bytes_to_device - from->bytes_to_device;
+    profile->bytes_from_device = device->bytes_from_device - from->bytes_from_device;
+    profile->buffers_created = device->buffers_created - from->buffers_created;
+    profile->kernels_created = device->kernels_created - from->kernels_created;
 }
 
 ovoid_status ov_device_get(ovoid_context *context, ov_device **device) {

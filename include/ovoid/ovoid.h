@@ -187,6 +187,22 @@ OVOID_API ovoid_status ovoid_context_profile(ovoid_context *context, bool on);
 OVOID_API ovoid_status ovoid_context_kernel_times(ovoid_context *context, ovoid_kernel_time **times,
                                                   size_t *count);
 
+/* What is counted at the opened device. Bytes are those of copies between host and device. */
+typedef enum ovoid_count {
+    OVOID_COUNT_LAUNCHES,          /* kernels enqueued */
+    OVOID_COUNT_BLOCKING_READS,    /* copies from the device that the host waits for, and with them
+                                      for all that was enqueued before */
+    OVOID_COUNT_BLOCKING_WRITES,   /* copies to the device that the host waits for */
+    OVOID_COUNT_BYTES_TO_DEVICE,   /* of all copies, waited for or not */
+    OVOID_COUNT_BYTES_FROM_DEVICE, /* of all copies, waited for or not */
+    OVOID_COUNT_BUFFERS_CREATED,   /* allocations of device memory */
+    OVOID_COUNT_KERNELS_CREATED    /* kernel objects made, each once for a device */
+} ovoid_count;
+
+/* How much of it there was since the device was opened; 0 before one is opened. Counting is always
+ * on and takes no time. */
+OVOID_API uint64_t ovoid_context_count(const ovoid_context *context, ovoid_count what);
+
 /* Frees memory that the library handed over; NULL is fine. */
 OVOID_API void ovoid_free(void *memory);
 
@@ -603,8 +619,8 @@ typedef struct ovoid_fit_options {
 
 /* Where the time of a fit went, and how much was done. The seconds are measured on the host between
  * waits for the device, so they include launches. Method adaptive waits too seldom for that: of it,
- * only launches are filled in, sampling included, and all else is 0. ovoid_context_profile() tells
- * the times of kernels for both methods. */
+ * only what follows moments_passes is filled in, sampling included, and all else is 0; of l1,
+ * sampling is left out. ovoid_context_profile() tells the times of kernels for both methods. */
 typedef struct ovoid_fit_profile {
     double lists_seconds;   /* building the pack lists */
     double field_seconds;   /* phi~ and the residual, including every trial step */
@@ -613,7 +629,13 @@ typedef struct ovoid_fit_profile {
     uint64_t list_builds;
     uint64_t field_passes;
     uint64_t moments_passes;
-    uint64_t launches; /* kernels enqueued */
+    uint64_t launches; /* kernels enqueued; this and the following as in ovoid_count */
+    uint64_t blocking_reads;
+    uint64_t blocking_writes;
+    uint64_t bytes_to_device;
+    uint64_t bytes_from_device;
+    uint64_t buffers_created;
+    uint64_t kernels_created;
 } ovoid_fit_profile;
 
 /* Whether the goal of method adaptive was reached, and if not, why. */

@@ -272,10 +272,11 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                        ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
+    ovoid_fit_profile before = {0};
     ov_l1_evaluation last;
     fit f = {.options = options, .count = atoms};
     OV_TRY(ov_device_get(context, &device));
-    const uint64_t launches = device->launches;
+    ov_device_counted(device, NULL, &before);
     OV_TRY(allocate(&f, context, samples));
     initialise(&f, xyzr);
     OV_TRY(iterate(&f, &last, &result->iterations));
@@ -286,7 +287,7 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     result->rms_error = sqrt(last.accuracy / (double)samples->points.count);
     result->max_error = last.max_error;
     result->profile = f.objective.profile;
-    result->profile.launches = device->launches - launches;
+    ov_device_counted(device, &before, &result->profile);
 cleanup:
     destroy(&f);
     return status;

@@ -1241,6 +1241,9 @@ static void test_defective_devices(void **state) {
     text = CHILD("", vendors); /* passes over the defective GPUs */
     assert_contains(text, "device Fake Full 4090");
     free(text);
+    text = CHILD("", vendors, "FAKE_ICD=gpu"); /* the first GPU without one, before all others */
+    assert_contains(text, "device Fake Screen");
+    free(text);
     text = CHILD("nothing", vendors);
     assert_contains(text, "Fake Away, platform Fake Platform (is not available");
     free(text);

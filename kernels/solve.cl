@@ -8,13 +8,14 @@
  * z: "to_polynomial" maps a direction of the parameters to its ten coefficients, "to_parameters" is
  * the transpose, from moments to parameters. (model/factor.h has them in double.)
  *
- * One work-item per ellipsoid in groups of OV_SOLVE_GROUP. Dot products: each group leaves one
- * partial sum, the next kernel's groups add them up, all in one order.
+ * One work-item per ellipsoid in groups of OV_SOLVE_GROUP, which the build sets. Dot products: each
+ * group leaves one partial sum, the next kernel's groups add them up, all in one order.
  */
 
 #define PARAMETERS 10
-#define BLOCK 55 /* lower triangle of a 10 x 10 block, by rows */
-#define FACTOR 6
+#define BLOCK OV_SOLVE_BLOCK
+#define FACTOR OV_SOLVE_FACTOR
+#define SOLVE_KERNEL __kernel __attribute__((reqd_work_group_size(OV_SOLVE_GROUP, 1, 1)))
 
 static inline void to_polynomial(const float *l, const float *v, float *c) {
     const float s1 = fma(l[0], v[1], fma(l[1], v[2], l[2] * v[3]));
@@ -153,13 +154,12 @@ static inline float take_sum(__global const float *partial, uint groups) {
 /* The blocks C^T G C + lambda diag(C^T G C), factored; the diagonal D, 1 where a parameter does not
  * matter, so that it stays still even without damping; and the start of the iteration: x = 0, r =
  * -C^T moments, z = block^-1 r, p = z. */
-__kernel void solve_start(const uint count, const float lambda,
-                          __global const float *restrict factor,
-                          __global const float *restrict gram,
-                          __global const float *restrict moments, __global float *restrict block,
-                          __global float *restrict diagonal, __global float *restrict x,
-                          __global float *restrict r, __global float *restrict p,
-                          __global float *restrict polynomial, __global float *restrict rz) {
+SOLVE_KERNEL void
+solve_start(const uint count, const float lambda, __global const float *restrict factor,
+            __global const float *restrict gram, __global const float *restrict moments,
+            __global float *restrict block, __global float *restrict diagonal,
+            __global float *restrict x, __global float *restrict r, __global float *restrict p,
+            __global float *restrict polynomial, __global float *restrict rz) {
     __local float scratch[OV_SOLVE_GROUP];
     const uint index = get_global_id(0);
     float sum = 0.0f;
@@ -211,12 +211,12 @@ __kernel void solve_start(const uint count, const float lambda,
 }
 
 /* q = C^T moments + lambda D p, and the partial sums of p . q. */
-__kernel void solve_product(const uint count, const float lambda,
-                            __global const float *restrict factor,
-                            __global const float *restrict moments,
-                            __global const float *restrict diagonal,
-                            __global const float *restrict p, __global float *restrict q,
-                            __global float *restrict pq) {
+SOLVE_KERNEL void solve_product(const uint count, const float lambda,
+                                __global const float *restrict factor,
+                                __global const float *restrict moments,
+                                __global const float *restrict diagonal,
+                                __global const float *restrict p, __global float *restrict q,
+                                __global float *restrict pq) {
     __local float scratch[OV_SOLVE_GROUP];
     const uint index = get_global_id(0);
     float sum = 0.0f;
@@ -236,12 +236,12 @@ __kernel void solve_product(const uint count, const float lambda,
 }
 
 /* alpha = rz / pq; x += alpha p, r -= alpha q, z = block^-1 r, and the partial sums of r . z. */
-__kernel void solve_update(const uint count, const uint groups,
-                           __global const float *restrict block, __global const float *restrict rz,
-                           __global const float *restrict pq, __global const float *restrict p,
-                           __global const float *restrict q, __global float *restrict x,
-                           __global float *restrict r, __global float *restrict z,
-                           __global float *restrict rz_next) {
+SOLVE_KERNEL void solve_update(const uint count, const uint groups,
+                               __global const float *restrict block,
+                               __global const float *restrict rz, __global const float *restrict pq,
+                               __global const float *restrict p, __global const float *restrict q,
+                               __global float *restrict x, __global float *restrict r,
+                               __global float *restrict z, __global float *restrict rz_next) {
     __local float scratch[OV_SOLVE_GROUP];
     __local float alpha;
     const uint index = get_global_id(0);
@@ -271,12 +271,12 @@ __kernel void solve_update(const uint count, const uint groups,
 }
 
 /* beta = rz_next / rz; p = z + beta p and its polynomials. */
-__kernel void solve_direction(const uint count, const uint groups,
-                              __global const float *restrict factor,
-                              __global const float *restrict rz,
-                              __global const float *restrict rz_next,
-                              __global const float *restrict z, __global float *restrict p,
-                              __global float *restrict polynomial) {
+SOLVE_KERNEL void solve_direction(const uint count, const uint groups,
+                                  __global const float *restrict factor,
+                                  __global const float *restrict rz,
+                                  __global const float *restrict rz_next,
+                                  __global const float *restrict z, __global float *restrict p,
+                                  __global float *restrict polynomial) {
     __local float beta;
     const uint index = get_global_id(0);
     if (get_local_id(0) == 0) {

@@ -15,17 +15,24 @@
  * of OV_PACK points is handled by `lanes` work-items with vectors of `vector` floats. */
 typedef struct ov_shape {
     uint32_t vector; /* 16, 8, 4 or 1 */
-    uint32_t lanes;  /* work-items that share a pack or an ellipsoid: 1 on CPUs, 32 on GPUs */
+    uint32_t lanes;  /* work-items that share a pack: 1 on CPUs, OV_PACK on GPUs */
 } ov_shape;
 
 /* Environment variables for development and tests:
- *   OVOID_SHAPE       "VxL", such as 1x16 or 4x1, instead of the device's own shape: V one of 1, 4,
- * 8, 16, L a power of two, V * L a divisor of OV_PACK OVOID_KERNEL_DIR  folder with the kernel
- * sources, all of them, instead of the embedded ones OVOID_CACHE       auto (default), on or off:
- * whether compiled programs are kept. auto leaves that to drivers with a cache of their own (PoCL)
- *   OVOID_CACHE_DIR   where they are kept, instead of $XDG_CACHE_HOME/ovoid or ~/.cache/ovoid
- *   OVOID_POOL        off: buffers are created as large as asked for, and released at once, for
- *                     simulators that look for accesses beyond a buffer's end */
+ *
+ * - OVOID_SHAPE: "VxL", such as 1x16 or 4x1, instead of the device's own shape. V is one of 1, 4,
+ *   8, 16, L a power of two, and V * L a divisor of OV_PACK.
+ *
+ * - OVOID_KERNEL_DIR: the folder with the kernel sources, all of them, instead of the embedded
+ *   ones.
+ *
+ * - OVOID_CACHE: auto (default), on or off: whether compiled programs are kept. auto leaves that to
+ *   drivers with a cache of their own (PoCL).
+ *
+ * - OVOID_CACHE_DIR: where they are kept, instead of $XDG_CACHE_HOME/ovoid or ~/.cache/ovoid.
+ *
+ * - OVOID_POOL: off creates buffers as large as asked for, and releases them at once, for
+ * simulators that look for accesses beyond a buffer's end. */
 
 typedef struct ov_pool ov_pool; /* buffers kept for the next that need one (pool.c) */
 
@@ -36,9 +43,11 @@ typedef struct ov_device {
     cl_context context;
     cl_command_queue queue; /* in order */
     ov_shape shape;
-    size_t max_group;  /* largest work-group */
-    uint64_t launches; /* kernels enqueued since the device was opened, and so on, as
-                          ovoid_count says */
+    size_t max_group;     /* largest work-group */
+    uint32_t team;        /* work-items that share a term, -DOV_TEAM: 1 with one lane */
+    uint32_t solve_group; /* a work-group of the solver, -DOV_SOLVE_GROUP */
+    uint64_t launches;    /* kernels enqueued since the device was opened, and so on, as
+                             ovoid_count says */
     uint64_t blocking_reads, blocking_writes;
     uint64_t bytes_to_device, bytes_from_device;
     uint64_t buffers_created, kernels_created;
@@ -70,6 +79,7 @@ typedef struct ov_kernel {
     const char *program;
     const char *name;
     size_t max_group; /* largest work-group of this kernel */
+    size_t group;     /* the only work-group that it is compiled for; 0: any */
     size_t arg_count;
 } ov_kernel;
 
@@ -85,10 +95,6 @@ ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const
                               ov_kernel *kernel);
 void ov_kernel_destroy(ov_kernel *kernel);
 
-/* `wanted` work-items in a group, or as many as the kernel can have: for kernels whose work-items
- * share nothing. */
-size_t ov_kernel_group(const ov_kernel *kernel, size_t wanted);
-
 /* One kernel argument: a value of `size` bytes. OV_ARG takes an lvalue (a cl_mem, a scalar). */
 typedef struct ov_arg {
     size_t size;
@@ -98,8 +104,10 @@ typedef struct ov_arg {
 #define OV_LOCAL(bytes) ((ov_arg){(bytes), NULL})
 
 /* Sets all arguments and enqueues a one-dimensional launch of at least `global` work-items in
- * groups of `local` (0: the driver chooses; otherwise global is rounded up to a multiple, so
- * kernels check their bounds). Does not wait. global == 0 does nothing. */
+ * groups of `local`, or of fewer where the device cannot run so many of this kernel (0: the driver
+ * chooses; otherwise global is rounded up to a multiple, so kernels check their bounds). A kernel
+ * whose work-items share memory is compiled for its group (reqd_work_group_size), and launched with
+ * that alone. Does not wait. global == 0 does nothing. */
 ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t global, size_t local,
                        const ov_arg *args, size_t arg_count);
 #define OV_LAUNCH(context, kernel, global, local, ...)                                             \

@@ -7,21 +7,16 @@
 
 /* ---- launches ----------------------------------------------------------------------------- */
 
-size_t ov_kernel_group(const ov_kernel *kernel, size_t wanted) {
-    return wanted < kernel->max_group ? wanted : kernel->max_group;
-}
-
 static ovoid_status check_launch(ovoid_context *context, const ov_kernel *kernel, size_t global,
                                  size_t local, size_t arg_count) {
     if (arg_count != kernel->arg_count)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "kernel %s of %s.cl takes %zu arguments, %zu were given", kernel->name,
                        kernel->program, kernel->arg_count, arg_count);
-    if (local > kernel->max_group)
-        return ov_fail(context, OVOID_ERROR_LIMIT,
-                       "kernel %s runs in groups of at most %zu work-items on %s, %zu were asked "
-                       "for",
-                       kernel->name, kernel->max_group, context->device->info.name, local);
+    if (kernel->group && local != kernel->group)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "kernel %s is compiled for groups of %zu work-items, launched with %zu",
+                       kernel->name, kernel->group, local);
     if (local && global > SIZE_MAX - (local - 1))
         return ov_fail(context, OVOID_ERROR_LIMIT, "kernel %s: %zu work-items are too many",
                        kernel->name, global);
@@ -41,6 +36,8 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
         return OVOID_OK;
     if (!context->device || !kernel->handle)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "a kernel was launched before it was made");
+    if (local > kernel->max_group)
+        local = kernel->max_group;
     ovoid_status status = check_launch(context, kernel, global, local, arg_count);
     if (status == OVOID_OK)
         status = ov_progress_ask(context);

@@ -207,6 +207,39 @@ static ovoid_status set_shape(ovoid_context *context, ov_device *device) {
     return OVOID_OK;
 }
 
+/* ---- groups ------------------------------------------------------------------------------- */
+
+/* Work-items that a GPU runs in step, where it says so; 0 where it does not. */
+#ifndef CL_DEVICE_PREFERRED_WORK_GROUP_SIZE_MULTIPLE
+#define CL_DEVICE_PREFERRED_WORK_GROUP_SIZE_MULTIPLE 0x1067 /* OpenCL 3.0 */
+#endif
+#ifndef CL_DEVICE_WAVEFRONT_WIDTH_AMD
+#define CL_DEVICE_WAVEFRONT_WIDTH_AMD 0x4043
+#endif
+static size_t wave_of(const ov_device *device) {
+    size_t multiple = 0;
+    cl_uint width = 0;
+    if (clGetDeviceInfo(device->id, CL_DEVICE_WAVEFRONT_WIDTH_AMD, sizeof width, &width, NULL) ==
+        CL_SUCCESS)
+        return width;
+    if (clGetDeviceInfo(device->id, CL_DEVICE_PREFERRED_WORK_GROUP_SIZE_MULTIPLE, sizeof multiple,
+                        &multiple, NULL) == CL_SUCCESS)
+        return multiple;
+    return 0;
+}
+
+/* Groups whose work-items share memory: a warp, or a wave of 64 where the device has those, or the
+ * most that it runs. Powers of two. */
+#define WARP 32
+#define WAVE 64
+static void set_groups(ov_device *device) {
+    uint32_t group = wave_of(device) >= WAVE ? WAVE : WARP;
+    while (group > 1 && group > device->max_group)
+        group /= 2;
+    device->solve_group = group;
+    device->team = device->shape.lanes == 1 ? 1 : group; /* lanes fit into it: both are powers */
+}
+
 /* ---- opening and closing ------------------------------------------------------------------ */
 
 static void release(ov_device *device) {
@@ -265,6 +298,7 @@ static ovoid_status make_device(ovoid_context *context, const ov_device_entry *e
         goto cleanup;
     }
     OV_TRY(set_shape(context, device));
+    set_groups(device);
     if (context->profile)
         OV_TRY(ov_profile_start(context, device));
     *made = device;

@@ -221,9 +221,12 @@ static ovoid_status make_program(ovoid_context *context, ov_device *device, cons
     ovoid_status status = OVOID_OK;
     ov_text source = {0}, key = {0};
     cl_program made = NULL;
-    char options[128];
-    snprintf(options, sizeof options, "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d",
-             (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK);
+    char options[160];
+    snprintf(options, sizeof options,
+             "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d -DOV_TEAM=%u "
+             "-DOV_SOLVE_GROUP=%u",
+             (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK,
+             (unsigned)device->team, (unsigned)device->solve_group);
     OV_TRY(program_source(context, stem, &source));
     bool cache =
         ov_cache_wanted(context, device) && binary_key(device, options, &source, &key) == OVOID_OK;
@@ -332,7 +335,13 @@ static ovoid_status make_kernel(ovoid_context *context, ov_device *device, ov_ke
         code = clGetKernelWorkGroupInfo(kernel->handle, device->id, CL_KERNEL_WORK_GROUP_SIZE,
                                         sizeof kernel->max_group, &kernel->max_group, NULL);
     }
+    size_t group[3] = {0};
+    if (code == CL_SUCCESS)
+        code =
+            clGetKernelWorkGroupInfo(kernel->handle, device->id, CL_KERNEL_COMPILE_WORK_GROUP_SIZE,
+                                     sizeof group, group, NULL);
     kernel->arg_count = arg_count;
+    kernel->group = group[0];
     if (code == CL_SUCCESS)
         return OVOID_OK;
     clReleaseKernel(kernel->handle);

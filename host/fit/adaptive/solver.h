@@ -16,6 +16,7 @@ typedef struct ov_solver {
     ov_buffer moments;    /* of it */
     float *host;          /* factors as uploaded, steps and sums as read back */
     size_t host_capacity;
+    size_t group;        /* ellipsoids in a work-group */
     uint64_t iterations; /* of conjugate gradients, all solves together */
 } ov_solver;
 

@@ -88,6 +88,15 @@ static double first_step(const fit *f, size_t size, double largest) {
     return fmin(step, FIRST_CHANGE_MAX / largest);
 }
 
+/* A trial too far out to be a model, or to have a finite field, is as good as rejected. */
+static ovoid_status evaluate_trial(fit *f, ov_l1_evaluation *tried) {
+    const ovoid_status status = ov_l1_evaluate(&f->objective, f->trial, f->count, tried);
+    if (status != OVOID_ERROR_NUMERIC)
+        return status;
+    *tried = (ov_l1_evaluation){.accuracy = INFINITY, .max_error = INFINITY};
+    return OVOID_OK;
+}
+
 /* Steps 5.7 and 5.8: backtracking along -grad f until f falls by armijo * tau * |grad f|^2. On
  * success the trial becomes x and *now its evaluation; *tau is 0 where no step was found. */
 static ovoid_status line_search(fit *f, ov_l1_weights w, ov_l1_evaluation *now, double *tau) {
@@ -109,7 +118,7 @@ static ovoid_status line_search(fit *f, ov_l1_weights w, ov_l1_evaluation *now, 
         for (size_t j = 0; j < size; ++j)
             f->trial[j] = f->x[j] - step * f->gradient[j];
         ov_l1_evaluation tried;
-        OV_TRY(ov_l1_evaluate(&f->objective, f->trial, f->count, &tried));
+        OV_TRY(evaluate_trial(f, &tried));
         const double after = w.accuracy * tried.accuracy +
                              w.sparse * ov_l1_sparse_term(&f->objective, f->trial, f->count);
         if (after <= before - l1->armijo * step * square) {

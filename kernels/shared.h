@@ -38,6 +38,14 @@ typedef float ov_f32;
  * xxyz, xxzz, xyyy, xyyz, xyzz, xzzz, yyyy, yyyz, yyzz, yzzz, zzzz. */
 #define OV_GRAM 35
 
+/* Packs that share a sum of the misfit (kernels/misfit.cl). */
+#define OV_MISFIT_PACKS 64
+
+/* The most ellipsoids whose iterations take one work-group each, and its size at most
+ * (kernels/solve.cl). */
+#define OV_SOLVE_ALONE 1024
+#define OV_SOLVE_WIDE 256
+
 /* Floats of an ellipsoid in the solver (kernels/solve.cl): its factor L, and the lower triangle of
  * its 10 x 10 block by rows. */
 #define OV_SOLVE_FACTOR 6

@@ -374,6 +374,47 @@ static void more_than_one_group(void **state) {
                         test_size(3, 30) * 1e-5);
 }
 
+/* One group that does the rest of an iteration, and many: the same but for the order of sums. */
+static void alone_equals_together(void **state) {
+    test_skip_simulated(*state);
+    const size_t counts[] = {1, 40, OV_SOLVE_WIDE + 44};
+    for (size_t n = 0; n < sizeof counts / sizeof *counts; ++n) {
+        problem p;
+        ov_solver alone = {0}, together = {.apart = true};
+        create_problem(&p, *state, counts[n], 4 * counts[n] + 60, 0, 30 + n);
+        double *const one = solve(&p, &alone, 0.3, 4, 0.0);
+        double *const many = solve(&p, &together, 0.3, 4, 0.0);
+        double largest = 0.0, off = 0.0;
+        for (size_t j = 0; j < counts[n] * P; ++j) {
+            largest = fmax(largest, fabs(many[j]));
+            off = fmax(off, fabs(one[j] - many[j]));
+        }
+        print_message("%zu ellipsoids: off by %.1e of %.1e\n", counts[n], off, largest);
+        assert_true(largest > 0.0 && off < 1e-4 * largest);
+        free(one);
+        free(many);
+        ov_solver_destroy(&alone);
+        ov_solver_destroy(&together);
+        destroy_problem(&p);
+    }
+}
+
+/* Nothing is waited for but the step; an iteration takes three launches. */
+static void nothing_is_waited_for(void **state) {
+    test_skip_simulated(*state);
+    problem p;
+    ov_solver solver = {0};
+    create_problem(&p, *state, 20, 300, 0, 11);
+    free(solve(&p, &solver, 0.1, 1, 0.0));
+    const ov_device *const device = p.b.context->device;
+    const uint64_t reads = device->blocking_reads, launches = device->launches;
+    free(solve(&p, &solver, 0.1, 25, 0.0));
+    assert_int_equal(device->blocking_reads - reads, 1);
+    assert_int_equal(device->launches - launches, 2 + 1 + 25 * 3); /* moments, gram, start */
+    ov_solver_destroy(&solver);
+    destroy_problem(&p);
+}
+
 /* Ellipsoids that reach no point stay still, and do not hinder the others; even undamped. */
 static void ellipsoids_without_points(void **state) {
     expect_solution(*state, test_size(4, 2), test_size(400, 60), 1, 0.1, 100, 1e-5);
@@ -470,6 +511,8 @@ int main(void) {
         cmocka_unit_test(several_ellipsoids),
         cmocka_unit_test(one_ellipsoid_takes_one_iteration),
         cmocka_unit_test(more_than_one_group),
+        cmocka_unit_test(alone_equals_together),
+        cmocka_unit_test(nothing_is_waited_for),
         cmocka_unit_test(ellipsoids_without_points),
         cmocka_unit_test(no_residual_no_step),
         cmocka_unit_test(solutions_repeat),

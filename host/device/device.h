@@ -139,6 +139,16 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
 ovoid_status ov_buffer_put(ovoid_context *context, ov_buffer *buffer, const void *data,
                            size_t bytes, const char *what);
 
+/* A read that is waited for later, so that the device has something to do meanwhile: `data` is to
+ * stay until ov_later_end(), which has to follow, after failures too. {0} is none. */
+typedef struct ov_later {
+    cl_event event;
+} ov_later;
+ovoid_status ov_buffer_read_later(ovoid_context *context, const ov_buffer *buffer, size_t offset,
+                                  void *data, size_t bytes, ov_later *later);
+/* Waits for the read, but not for what was enqueued after it; at once where there is none. */
+ovoid_status ov_later_end(ovoid_context *context, ov_later *later);
+
 /* Waits until everything enqueued has run. */
 ovoid_status ov_finish(ovoid_context *context);
 

@@ -213,3 +213,30 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
     context->device->blocking_reads++;
     return idle(context);
 }
+
+ovoid_status ov_buffer_read_later(ovoid_context *context, const ov_buffer *buffer, size_t offset,
+                                  void *data, size_t bytes, ov_later *later) {
+    ovoid_status status = check_range(context, buffer, offset, bytes);
+    if (status != OVOID_OK)
+        return status;
+    cl_int code;
+    do
+        code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_FALSE, offset, bytes,
+                                   data, 0, NULL, &later->event);
+    while (made_room(context->device, code));
+    if (code != CL_SUCCESS) {
+        later->event = NULL;
+        return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+    }
+    context->device->bytes_from_device += bytes;
+    return OVOID_OK;
+}
+
+ovoid_status ov_later_end(ovoid_context *context, ov_later *later) {
+    if (!later->event)
+        return OVOID_OK;
+    const cl_int code = clWaitForEvents(1, &later->event);
+    clReleaseEvent(later->event);
+    later->event = NULL;
+    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clWaitForEvents", NULL);
+}

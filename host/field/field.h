@@ -104,6 +104,12 @@ void ov_pack_box(const float *pack, float box[6]);
 /* Index of cell (x, y, z), `bits` bits each (1 to 21), along the Hilbert curve. */
 uint64_t ov_hilbert_index(uint32_t x, uint32_t y, uint32_t z, unsigned bits);
 
+/* order[k] = index of the k-th point along the curve, of cells of about `resolution` angstrom; xyz:
+ * 3
+ * * count coordinates. */
+ovoid_status ov_curve_order(ovoid_context *context, const double *xyz, size_t count,
+                            double resolution, uint32_t *order);
+
 /* order[k] = index of the k-th smallest key; equal keys keep their order. */
 ovoid_status ov_sort_keys(ovoid_context *context, const uint64_t *keys, size_t count,
                           uint32_t *order);

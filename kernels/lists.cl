@@ -153,9 +153,9 @@ static inline uint ov_bin(uint group, uint term, uint block) {
  * one after, and chain[term].y the number of entries. Chunks from `room` on are counted, not
  * written.
  *
- * tally: chunks taken, pairs of every term, entries of every bin, pairs of every group, all zero at
- * the start but those of terms. block: terms that share a bin. groups: of packs, 0 where nobody
- * wants their lists, and bins and groups are not counted. */
+ * tally, zero at the start: chunks taken, entries of every bin, pairs of every group, pairs of
+ * every term. block: terms that share a bin. groups: of packs, 0 where nobody wants their lists,
+ * and bins and groups are not counted. */
 __kernel void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
                              const ov_tree tree, __global const float *restrict boxes,
                              const float skin, const uint groups, const uint block, const uint room,
@@ -171,7 +171,7 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
-    __global uint *const bins = tally + 1 + terms_count;
+    __global uint *const bins = tally + 1;
     __global uint *const pairs = bins + (size_t)groups * OV_BINS;
     const ov_term t = terms[index];
     uint found = 0, entries = 0, first = 0, chunk = 0;
@@ -242,51 +242,93 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
             fresh = true;
         }
     }
-    tally[1 + index] = found;
+    pairs[groups + index] = found;
     chain[index] = (uint2)(first, entries);
 }
 
-/* The packs of every term in ascending order: those of term i from item[start[i]] on. */
-__kernel void lists_of_terms(const uint terms_count, __global const uint2 *restrict chain,
-                             __global const uint *restrict next,
-                             __global const uint *restrict entry_group,
-                             __global const ushort *restrict entry_bits,
-                             __global const uint *restrict start, __global uint *restrict item) {
-    const uint index = get_global_id(0);
-    if (index >= terms_count)
-        return;
-    const uint entries = chain[index].y;
-    uint chunk = chain[index].x;
-    uint to = start[index];
-    for (uint k = 0; k < entries; ++k) {
-        if (k > 0 && k % OV_CHUNK == 0)
-            chunk = next[chunk];
-        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
-        const uint pack = entry_group[at] * OV_GROUP;
-        for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
-            item[to++] = pack + ov_lowest(bits);
+/* Turns `count` numbers into where each begins when all are laid out one after the other, and
+ * leaves zeros behind: a work-item takes a stretch of them. Returns the sum of all; every work-item
+ * of the only work-group takes part. start may be null. */
+static inline ulong turn_to_starts(__global uint *number, const uint count, __global uint *start,
+                                   __local ulong *scratch) {
+    const uint at = get_local_id(0), size = get_local_size(0);
+    const uint each = (count + size - 1) / size, first = min(at * each, count);
+    const uint end = min(first + each, count);
+    ulong own = 0, before = 0, all = 0;
+    for (uint k = first; k < end; ++k)
+        own += number[k];
+    scratch[at] = own;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint k = 0; k < size; ++k) {
+        before += k < at ? scratch[k] : 0;
+        all += scratch[k];
     }
+    for (uint k = first; k < end; ++k) {
+        const uint one = number[k];
+        number[k] = 0;
+        if (start)
+            start[k] = (uint)before;
+        before += one;
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    return all;
 }
 
-/* Hands the entries to their groups: place holds where each bin begins, and afterwards ends. The
- * order within a bin depends on timing. */
+/* Where everything that was counted begins. place: the bins, then the pairs of the groups. start:
+ * the pairs of the terms, and where the last ones end. Either may be null. totals: chunks taken,
+ * entries, and pairs as low and high half. The tally is zero afterwards, for the next time. One
+ * work-group. */
+__kernel void scan_lists(const uint terms_count, const uint groups, __global uint *restrict tally,
+                         __global uint *restrict place, __global uint *restrict start,
+                         __global uint *restrict totals) {
+    __local ulong scratch[OV_SCAN_GROUP];
+    if (get_group_id(0) > 0)
+        return;
+    const uint bins = groups * OV_BINS;
+    __global uint *const pairs = tally + 1 + bins;
+    const ulong entries = turn_to_starts(tally + 1, bins, place, scratch);
+    turn_to_starts(pairs, groups, place ? place + bins : place, scratch);
+    const ulong items = turn_to_starts(pairs + groups, terms_count, start, scratch);
+    if (get_local_id(0) > 0)
+        return;
+    if (start)
+        start[terms_count] = (uint)items;
+    totals[0] = tally[0];
+    totals[1] = (uint)entries;
+    totals[2] = (uint)items;
+    totals[3] = (uint)(items >> 32);
+    tally[0] = 0;
+}
+
+/* Hands out the entries of every term. item: its packs in ascending order, from item[start[i]] on.
+ * group_term, group_bits: the entries of each group of packs; place holds where each bin begins,
+ * and afterwards ends, and the order within a bin depends on timing. start or place may be null:
+ * nobody wants these lists. */
 __kernel void
-entries_of_groups(const uint terms_count, const uint block, __global const uint2 *restrict chain,
-                  __global const uint *restrict next, __global const uint *restrict entry_group,
-                  __global const ushort *restrict entry_bits, __global uint *restrict place,
-                  __global uint *restrict group_term, __global ushort *restrict group_bits) {
+hand_out_entries(const uint terms_count, const uint block, __global const uint2 *restrict chain,
+                 __global const uint *restrict next, __global const uint *restrict entry_group,
+                 __global const ushort *restrict entry_bits, __global const uint *restrict start,
+                 __global uint *restrict item, __global uint *restrict place,
+                 __global uint *restrict group_term, __global ushort *restrict group_bits) {
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
     const uint entries = chain[index].y;
     uint chunk = chain[index].x;
+    uint to = start ? start[index] : 0;
     for (uint k = 0; k < entries; ++k) {
         if (k > 0 && k % OV_CHUNK == 0)
             chunk = next[chunk];
         const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
-        const uint to = atomic_inc(&place[ov_bin(entry_group[at], index, block)]);
-        group_term[to] = index;
-        group_bits[to] = entry_bits[at];
+        const uint group = entry_group[at];
+        if (place) {
+            const uint own = atomic_inc(&place[ov_bin(group, index, block)]);
+            group_term[own] = index;
+            group_bits[own] = entry_bits[at];
+        }
+        if (start)
+            for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
+                item[to++] = group * OV_GROUP + ov_lowest(bits);
     }
 }
 

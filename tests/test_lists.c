@@ -304,6 +304,94 @@ static void lists_can_be_rebuilt(void **state) {
     bench_destroy(&b);
 }
 
+/* Either list by itself is what it is beside the other, in one structure after another size. */
+static void either_list_alone(void **state) {
+    bench b;
+    ov_lists alone = {0};
+    for (int round = 0; round < 4; ++round) {
+        pairs whole;
+        random_bench(&b, *state, MODEL_RANDOM, round == 2 ? 90 : 30,
+                     test_size(round == 1 ? 3000 : 1000, 200), 1e-4, 90 + (uint64_t)round);
+        read_pairs(*state, &b.lists, &whole);
+        alone.terms_only = round % 2 == 0;
+        alone.packs_only = !alone.terms_only;
+        test_check(*state, ov_lists_build(*state, &alone, &b.points, &b.terms, 0.0));
+        assert_int_equal(alone.items, whole.items);
+        const ov_buffer *const item = alone.terms_only ? &alone.term_item : &alone.pack_item;
+        const ov_buffer *const start = alone.terms_only ? &alone.term_start : &alone.pack_start;
+        const size_t starts = 1 + (alone.terms_only ? whole.terms : whole.packs);
+        uint32_t *const items = read_indices(*state, item, whole.items);
+        uint32_t *const begins = read_indices(*state, start, starts);
+        assert_memory_equal(items, alone.terms_only ? whole.term_item : whole.pack_item,
+                            whole.items * sizeof *items);
+        assert_memory_equal(begins, alone.terms_only ? whole.term_start : whole.pack_start,
+                            starts * sizeof *begins);
+        free(items);
+        free(begins);
+        free_pairs(&whole);
+        bench_destroy(&b);
+    }
+    ov_lists_destroy(&alone);
+}
+
+/* The twin of scan_lists: starts of `count` counts, and their sum. */
+static uint64_t starts_of(const uint32_t *counts, size_t count, uint32_t *start) {
+    uint64_t sum = 0;
+    for (size_t k = 0; k < count; ++k) {
+        start[k] = (uint32_t)sum;
+        sum += counts[k];
+    }
+    return sum;
+}
+
+/* Whatever the work-group, sums beyond 32 bits included; the counts are zero afterwards. */
+static void counts_become_starts(void **state) {
+    enum { TERMS = 300, GROUPS = 21, BINS = GROUPS * OV_BINS, ALL = 1 + BINS + GROUPS + TERMS };
+    const size_t sizes[] = {1, 7, 32};
+    ovoid_context *const context = *state;
+    ov_kernel kernel = {0};
+    test_check(context, ov_kernel_create(context, "lists", "scan_lists", &kernel));
+    for (size_t n = 0; n < sizeof sizes / sizeof *sizes; ++n) {
+        test_random random = {n};
+        ov_buffer counted = {0}, place = {0}, start = {0}, totals = {0};
+        uint32_t counts[ALL], wanted[BINS + GROUPS + TERMS];
+        for (size_t k = 0; k < ALL; ++k)
+            counts[k] = (uint32_t)(random_bits(&random) % (k > BINS + GROUPS ? 1u << 26 : 50));
+        const uint64_t entries = starts_of(counts + 1, BINS, wanted);
+        starts_of(counts + 1 + BINS, GROUPS, wanted + BINS);
+        const uint64_t items = starts_of(counts + 1 + BINS + GROUPS, TERMS, wanted + BINS + GROUPS);
+        assert_true(items > UINT32_MAX);
+        const cl_uint terms = TERMS, groups = GROUPS;
+        test_check(context, ov_buffer_put(context, &counted, counts, sizeof counts, "counts"));
+        test_check(context, ov_buffer_reserve(context, &place, (BINS + GROUPS) * 4, "starts"));
+        test_check(context, ov_buffer_reserve(context, &start, (TERMS + 1) * 4, "starts"));
+        test_check(context, ov_buffer_reserve(context, &totals, 4 * 4, "totals"));
+        test_check(context, OV_LAUNCH(context, &kernel, sizes[n], sizes[n], OV_ARG(terms),
+                                      OV_ARG(groups), OV_ARG(counted.memory), OV_ARG(place.memory),
+                                      OV_ARG(start.memory), OV_ARG(totals.memory)));
+        uint32_t *const total = read_indices(context, &totals, 4);
+        uint32_t *const places = read_indices(context, &place, BINS + GROUPS);
+        uint32_t *const starts = read_indices(context, &start, TERMS + 1);
+        uint32_t *const left = read_indices(context, &counted, ALL);
+        assert_int_equal(total[0], counts[0]);
+        assert_int_equal(total[1], entries);
+        assert_true(total[2] == (uint32_t)items && total[3] == items >> 32);
+        assert_memory_equal(places, wanted, (BINS + GROUPS) * sizeof *wanted);
+        assert_memory_equal(starts, wanted + BINS + GROUPS, TERMS * sizeof *wanted);
+        assert_int_equal(starts[TERMS], (uint32_t)items);
+        for (size_t k = 0; k < ALL; ++k)
+            assert_int_equal(left[k], 0);
+        free(total);
+        free(places);
+        free(starts);
+        free(left);
+        ov_buffer *const buffers[] = {&counted, &place, &start, &totals};
+        for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+            ov_buffer_destroy(buffers[k]);
+    }
+    ov_kernel_destroy(&kernel);
+}
+
 /* Entries come to their group in whatever order work-items happen to run; here, in the worst one.
  */
 static void lists_are_sorted_on_the_device(void **state) {
@@ -429,6 +517,8 @@ int main(void) {
         cmocka_unit_test(terms_below_the_cut_off),
         cmocka_unit_test(nothing_to_pair),
         cmocka_unit_test(lists_can_be_rebuilt),
+        cmocka_unit_test(either_list_alone),
+        cmocka_unit_test(counts_become_starts),
         cmocka_unit_test(lists_are_sorted_on_the_device),
         cmocka_unit_test(wide_terms_find_room),
         cmocka_unit_test(lists_are_reproducible),

@@ -158,10 +158,8 @@ typedef struct ov_lists {
     ov_buffer pack_start; /* packs + 1 */
     ov_buffer pack_item;  /* terms of each pack, ascending */
     /* Scratch, kept for the next time (kernels/lists.cl). */
-    ov_buffer tally, chain, next, entry_group, entry_bits, place, group_term, group_bits;
-    uint32_t *scan;
-    size_t scan_capacity;
-    ov_kernel packs_of_terms, lists_of_terms, entries_of_groups, lists_of_packs;
+    ov_buffer tally, totals, chain, next, entry_group, entry_bits, place, group_term, group_bits;
+    ov_kernel packs_of_terms, scan_lists, hand_out_entries, lists_of_packs;
 } ov_lists;
 
 /* Pairs terms with the packs that they reach, boxes grown by skin and the term's own (angstrom).

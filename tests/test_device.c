@@ -230,11 +230,14 @@ static void test_list(void **state) {
     ovoid_context *context = NULL;
     ovoid_device_info *devices = NULL;
     size_t count = 0;
-    assert_int_equal(ovoid_devices(NULL, &devices, &count), OVOID_ERROR_ARGUMENT);
+    assert_int_equal(ovoid_devices(NULL, sizeof(ovoid_device_info), &devices, &count),
+                     OVOID_ERROR_ARGUMENT);
     check(context, ovoid_context_create(&context));
-    assert_int_equal(ovoid_devices(context, NULL, &count), OVOID_ERROR_ARGUMENT);
-    assert_int_equal(ovoid_devices(context, &devices, NULL), OVOID_ERROR_ARGUMENT);
-    check(context, ovoid_devices(context, &devices, &count));
+    assert_int_equal(ovoid_devices(context, sizeof(ovoid_device_info), NULL, &count),
+                     OVOID_ERROR_ARGUMENT);
+    assert_int_equal(ovoid_devices(context, sizeof(ovoid_device_info), &devices, NULL),
+                     OVOID_ERROR_ARGUMENT);
+    check(context, ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count));
     assert_true(count > 0);
     for (size_t i = 0; i < count; i++) {
         assert_int_equal(devices[i].index, i);
@@ -315,7 +318,7 @@ static void test_bad_selector(void **state) {
     const ovoid_device_info *before = ovoid_context_device(context);
     ovoid_device_info *devices;
     size_t count;
-    check(context, ovoid_devices(context, &devices, &count));
+    check(context, ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count));
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         assert_int_equal(ovoid_context_open_device(context, bad[i]), OVOID_ERROR_DEVICE);
         assert_contains(ovoid_context_error(context), bad[i]);
@@ -1051,7 +1054,7 @@ static int child(const char *selector) {
     if (ovoid_context_create(&context) != OVOID_OK)
         return 1;
     ovoid_context_on_warning(context, print_warning, NULL);
-    ovoid_status status = ovoid_devices(context, &devices, &count);
+    ovoid_status status = ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count);
     printf("devices: %s %zu\n", ovoid_status_name(status), count);
     for (size_t i = 0; i < count; i++)
         printf("device: [%s] [%s]\n", devices[i].name, devices[i].platform);

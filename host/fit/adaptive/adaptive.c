@@ -186,7 +186,8 @@ static ovoid_status finish(ov_adaptive *f, ov_trial *best, ovoid_ellipsoid **ell
     result->points = f->samples.points.count;
     result->ellipsoids = best->count;
     result->iterations = f->steps;
-    result->solver_iterations = f->refiner.solver.iterations + f->local.refiner.solver.iterations;
+    result->adaptive.solver_iterations =
+        f->refiner.solver.iterations + f->local.refiner.solver.iterations;
     result->distance = judgement.valid && !is_coarse(f) ? judgement.deviation : NAN;
     result->verdict = verdict_of(f, best->count, &judgement);
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
@@ -233,7 +234,7 @@ ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t 
     OV_TRY(finish(&f, &best, ellipsoids, result));
     *owner = best.owner;
     best.owner = NULL;
-    result->profile.launches = device->launches - launches;
+    result->launches = device->launches - launches;
 cleanup:
     ov_trial_destroy(&best);
     destroy(&f);

@@ -137,13 +137,13 @@ static bool report(const fit *f, uint64_t iteration, bool accuracy_phase, ov_l1_
         .iterations = f->options->l1.iterations,
         .ellipsoids = f->count,
         .points = f->objective.samples->points.count,
-        .accuracy_term = now.accuracy,
-        .sparse_term = sparse,
-        .accuracy_weight = w.accuracy,
-        .sparse_weight = w.sparse,
-        .objective = w.accuracy * now.accuracy + w.sparse * sparse,
-        .max_error = now.max_error,
-        .step = tau,
+        .l1 = {.accuracy_term = now.accuracy,
+               .sparse_term = sparse,
+               .accuracy_weight = w.accuracy,
+               .sparse_weight = w.sparse,
+               .objective = w.accuracy * now.accuracy + w.sparse * sparse,
+               .max_error = now.max_error,
+               .step = tau},
     };
     return ov_progress_report(f->objective.context, &progress);
 }
@@ -283,10 +283,10 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     OV_TRY(hand_over(&f, ellipsoids));
     result->points = samples->points.count;
     result->ellipsoids = f.count;
-    result->rms_error = sqrt(last.accuracy / (double)samples->points.count);
-    result->max_error = last.max_error;
-    result->profile = f.objective.profile;
-    result->profile.launches = device->launches - launches;
+    result->l1 = f.objective.profile;
+    result->l1.rms_error = sqrt(last.accuracy / (double)samples->points.count);
+    result->l1.max_error = last.max_error;
+    result->launches = device->launches - launches;
 cleanup:
     destroy(&f);
     return status;

@@ -234,11 +234,14 @@ static void test_list(void **state) {
     ovoid_context *context = NULL;
     ovoid_device_info *devices = NULL;
     size_t count = 0;
-    assert_int_equal(ovoid_devices(NULL, &devices, &count), OVOID_ERROR_ARGUMENT);
+    assert_int_equal(ovoid_devices(NULL, sizeof(ovoid_device_info), &devices, &count),
+                     OVOID_ERROR_ARGUMENT);
     check(context, ovoid_context_create(&context));
-    assert_int_equal(ovoid_devices(context, NULL, &count), OVOID_ERROR_ARGUMENT);
-    assert_int_equal(ovoid_devices(context, &devices, NULL), OVOID_ERROR_ARGUMENT);
-    check(context, ovoid_devices(context, &devices, &count));
+    assert_int_equal(ovoid_devices(context, sizeof(ovoid_device_info), NULL, &count),
+                     OVOID_ERROR_ARGUMENT);
+    assert_int_equal(ovoid_devices(context, sizeof(ovoid_device_info), &devices, NULL),
+                     OVOID_ERROR_ARGUMENT);
+    check(context, ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count));
     assert_true(count > 0);
     for (size_t i = 0; i < count; i++) {
         assert_int_equal(devices[i].index, i);
@@ -319,7 +322,7 @@ static void test_bad_selector(void **state) {
     const ovoid_device_info *before = ovoid_context_device(context);
     ovoid_device_info *devices;
     size_t count;
-    check(context, ovoid_devices(context, &devices, &count));
+    check(context, ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count));
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         assert_int_equal(ovoid_context_open_device(context, bad[i]), OVOID_ERROR_DEVICE);
         assert_contains(ovoid_context_error(context), bad[i]);
@@ -820,7 +823,7 @@ static void test_launch(void **state) {
     check(context, ov_kernel_create(context, "fill", "fill", &fill));
     check(context, ov_kernel_create(context, "fill", "total", &total));
     check(context, ov_buffer_reserve(context, &buffer, sizeof out, "out"));
-    uint64_t launches = context->device->launches;
+    uint64_t launches = context->device->counts[OVOID_COUNT_LAUNCHES];
 
     check(context,
           OV_LAUNCH(context, &fill, 10, 8, OV_ARG(buffer.memory), OV_ARG(count), OV_ARG(first)));
@@ -837,7 +840,7 @@ static void test_launch(void **state) {
     check(context, ov_buffer_read(context, &buffer, 0, out, sizeof out));
     assert_int_equal(out[0], 136);
     assert_int_equal(out[15], 136);
-    assert_int_equal(context->device->launches, launches + 3);
+    assert_int_equal(context->device->counts[OVOID_COUNT_LAUNCHES], launches + 3);
 
     first = 99;
     check(context,
@@ -856,7 +859,8 @@ static void test_launch(void **state) {
     assert_int_equal(
         OV_LAUNCH(context, &fill, SIZE_MAX, 8, OV_ARG(buffer.memory), OV_ARG(count), OV_ARG(first)),
         OVOID_ERROR_LIMIT);
-    assert_int_equal(context->device->launches, launches + 3); /* failures do not count */
+    assert_int_equal(context->device->counts[OVOID_COUNT_LAUNCHES],
+                     launches + 3); /* failures do not count */
     ov_kernel_destroy(&fill);
     ov_kernel_destroy(&total);
     ov_buffer_destroy(&buffer);
@@ -1084,7 +1088,7 @@ static int child(const char *selector) {
     if (ovoid_context_create(&context) != OVOID_OK)
         return 1;
     ovoid_context_on_warning(context, print_warning, NULL);
-    ovoid_status status = ovoid_devices(context, &devices, &count);
+    ovoid_status status = ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count);
     printf("devices: %s %zu\n", ovoid_status_name(status), count);
     for (size_t i = 0; i < count; i++)
         printf("device: [%s] [%s]\n", devices[i].name, devices[i].platform);

@@ -322,9 +322,10 @@ static void test_far_chunks(void **state) {
     facets.chunk = mesh->triangles / OV_LEAF / BALLS;
     facets.batch = mesh->vertices / BALLS;
     const ov_sites sites = {.count = mesh->vertices, .trail = &trail};
-    const uint64_t before = device->launches;
+    const uint64_t before = device->counts[OVOID_COUNT_LAUNCHES];
     test_check(context, ov_facets_distances(context, &facets, &sites, squared));
-    assert_int_equal(device->launches - before, 2 * BALLS); /* the coarse ones, and one each */
+    assert_int_equal(device->counts[OVOID_COUNT_LAUNCHES] - before,
+                     2 * BALLS); /* the coarse ones, and one each */
     for (size_t v = 0; v < mesh->vertices; ++v)
         expect_near(squared[v], 0.0, 1e-9, "distance of a vertex from itself");
     free(squared);

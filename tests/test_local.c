@@ -243,14 +243,15 @@ static cost cost_in_a_row(ovoid_context *context, size_t count) {
     for (size_t i = 0; i < count; ++i)
         chosen[i] = i < 3;
     const ov_device *const device = context->device;
-    const cost before = {device->bytes_to_device, device->bytes_from_device,
-                         device->blocking_reads};
+    const cost before = {device->counts[OVOID_COUNT_BYTES_TO_DEVICE],
+                         device->counts[OVOID_COUNT_BYTES_FROM_DEVICE],
+                         device->counts[OVOID_COUNT_BLOCKING_READS]};
     refine_some(&local, &r, 2, chosen, r.x);
     test_check(context, ov_target_emphasise(context, &r.s.target, r.s.quadrics->centre,
                                             sizeof *r.s.quadrics, 3, 2.0, 2.0));
-    const cost after = {device->bytes_to_device - before.up,
-                        device->bytes_from_device - before.down,
-                        device->blocking_reads - before.reads};
+    const cost after = {device->counts[OVOID_COUNT_BYTES_TO_DEVICE] - before.up,
+                        device->counts[OVOID_COUNT_BYTES_FROM_DEVICE] - before.down,
+                        device->counts[OVOID_COUNT_BLOCKING_READS] - before.reads};
     print_message("%zu ellipsoids, %zu packs: %llu bytes up, %llu down, %llu reads\n", count,
                   r.s.samples.points.packs, (unsigned long long)after.up,
                   (unsigned long long)after.down, (unsigned long long)after.reads);

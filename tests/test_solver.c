@@ -407,10 +407,12 @@ static void nothing_is_waited_for(void **state) {
     create_problem(&p, *state, 20, 300, 0, 11);
     free(solve(&p, &solver, 0.1, 1, 0.0));
     const ov_device *const device = p.b.context->device;
-    const uint64_t reads = device->blocking_reads, launches = device->launches;
+    const uint64_t reads = device->counts[OVOID_COUNT_BLOCKING_READS],
+                   launches = device->counts[OVOID_COUNT_LAUNCHES];
     free(solve(&p, &solver, 0.1, 25, 0.0));
-    assert_int_equal(device->blocking_reads - reads, 1);
-    assert_int_equal(device->launches - launches, 2 + 1 + 25 * 3); /* moments, gram, start */
+    assert_int_equal(device->counts[OVOID_COUNT_BLOCKING_READS] - reads, 1);
+    assert_int_equal(device->counts[OVOID_COUNT_LAUNCHES] - launches,
+                     2 + 1 + 25 * 3); /* moments, gram, start */
     ov_solver_destroy(&solver);
     destroy_problem(&p);
 }

@@ -175,16 +175,14 @@ bool cli_is_model(const char *path);
 
 /* ---- profile.c ------------------------------------------------------------------------------ */
 
-#define CLI_COUNTS (OVOID_COUNT_KERNELS_CREATED + 1)
-
 /* Where the time of some work went. {0}, less wanted, is one that does nothing. */
 typedef struct cli_profile {
     bool wanted;              /* --profile */
     double began, seconds;    /* of the work, by the host's clock */
     ovoid_kernel_time *times; /* owned */
     size_t count;
-    uint64_t counts[CLI_COUNTS]; /* by ovoid_count: before the work, then what it made of them */
-    bool known;                  /* the work is done, and times hold what it launched */
+    uint64_t counts[OVOID_COUNTS]; /* by ovoid_count: before the work, then what it made of them */
+    bool known;                    /* the work is done, and times hold what it launched */
 } cli_profile;
 
 #define CLI_HELP_PROFILE "print which kernels took the device's time"
@@ -204,7 +202,7 @@ bool cli_profile_report(const cli_profile *profile, cJSON *report);
 
 /* Adds what was counted at the device, under the names of ovoid_fit_profile. counts: by
  * ovoid_count. */
-bool cli_counts_report(const uint64_t counts[CLI_COUNTS], cJSON *object);
+bool cli_counts_report(const uint64_t counts[OVOID_COUNTS], cJSON *object);
 
 /* ---- subcommands ---------------------------------------------------------------------------- */
 

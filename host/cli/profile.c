@@ -6,14 +6,14 @@ ovoid_status cli_profile_begin(cli_profile *profile, ovoid_context *context) {
     ovoid_status status = OVOID_OK;
     if (profile->wanted)
         status = ovoid_context_profile(context, true);
-    for (int what = 0; what < CLI_COUNTS; what++)
+    for (int what = 0; what < OVOID_COUNTS; what++)
         profile->counts[what] = ovoid_context_count(context, (ovoid_count)what);
     profile->began = cli_seconds();
     return status;
 }
 
 ovoid_status cli_profile_end(cli_profile *profile, ovoid_context *context) {
-    for (int what = 0; what < CLI_COUNTS; what++)
+    for (int what = 0; what < OVOID_COUNTS; what++)
         profile->counts[what] =
             ovoid_context_count(context, (ovoid_count)what) - profile->counts[what];
     if (!profile->wanted)
@@ -87,8 +87,8 @@ static bool report_kernel(cJSON *object, const cli_profile *profile,
            add_known(object, "share", round(kernel->seconds / profile->seconds * 1e6) / 1e6);
 }
 
-bool cli_counts_report(const uint64_t counts[CLI_COUNTS], cJSON *object) {
-    static const char *const keys[CLI_COUNTS] = {
+bool cli_counts_report(const uint64_t counts[OVOID_COUNTS], cJSON *object) {
+    static const char *const keys[OVOID_COUNTS] = {
         [OVOID_COUNT_LAUNCHES] = "launches",
         [OVOID_COUNT_BLOCKING_READS] = "blocking_reads",
         [OVOID_COUNT_BLOCKING_WRITES] = "blocking_writes",
@@ -98,7 +98,7 @@ bool cli_counts_report(const uint64_t counts[CLI_COUNTS], cJSON *object) {
         [OVOID_COUNT_KERNELS_CREATED] = "kernels_created",
     };
     bool good = true;
-    for (int what = 0; good && what < CLI_COUNTS; what++)
+    for (int what = 0; good && what < OVOID_COUNTS; what++)
         good = cJSON_AddNumberToObject(object, keys[what], (double)counts[what]) != NULL;
     return good;
 }

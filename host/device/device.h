@@ -43,16 +43,12 @@ typedef struct ov_device {
     cl_context context;
     cl_command_queue queue; /* in order */
     ov_shape shape;
-    size_t max_group;     /* largest work-group */
-    uint32_t team;        /* work-items that share a term, -DOV_TEAM: 1 with one lane */
-    uint32_t solve_group; /* a work-group of the solver, -DOV_SOLVE_GROUP */
-    uint64_t launches;    /* kernels enqueued since the device was opened, and so on, as
-                             ovoid_count says */
-    uint64_t blocking_reads, blocking_writes;
-    uint64_t bytes_to_device, bytes_from_device;
-    uint64_t buffers_created, kernels_created;
-    struct ov_program *programs; /* built so far, a list */
-    struct ov_made *made;        /* kernels made so far, a list */
+    size_t max_group;              /* largest work-group */
+    uint32_t team;                 /* work-items that share a term, -DOV_TEAM: 1 with one lane */
+    uint32_t solve_group;          /* a work-group of the solver, -DOV_SOLVE_GROUP */
+    uint64_t counts[OVOID_COUNTS]; /* since the device was opened */
+    struct ov_program *programs;   /* built so far, a list */
+    struct ov_made *made;          /* kernels made so far, a list */
     ov_pool *pool;
     uint32_t built;             /* programs compiled from source so far */
     uint32_t loaded;            /* programs taken from the cache so far */
@@ -68,10 +64,9 @@ ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
 /* Releases programs, queue and device; nothing happens when none is open. */
 void ov_device_close(ovoid_context *context);
 
-/* Fills in what the device has counted, less what it had counted `before` (NULL: nothing): launches
- * and what follows in the structure. The rest of it stays. */
-void ov_device_counted(const ov_device *device, const ovoid_fit_profile *before,
-                       ovoid_fit_profile *profile);
+/* What the device has counted, less what it had counted `before` (NULL: nothing). */
+void ov_device_counted(const ov_device *device, const uint64_t before[OVOID_COUNTS],
+                       uint64_t counts[OVOID_COUNTS]);
 
 /* A kernel. `name` and `program` are string constants. */
 typedef struct ov_kernel {

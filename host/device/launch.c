@@ -64,7 +64,7 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     while (made_room(context->device, code));
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueNDRangeKernel", kernel->name);
-    context->device->launches++;
+    context->device->counts[OVOID_COUNT_LAUNCHES]++;
     ov_profile_add(context->device, kernel->name, event);
     return OVOID_OK;
 }
@@ -94,7 +94,7 @@ static cl_int allocate(ov_device *device, ov_buffer *buffer, size_t bytes) {
     if (code != CL_SUCCESS)
         return code;
     ov_pool_own(device->pool, memory, bytes, buffer);
-    device->buffers_created++;
+    device->counts[OVOID_COUNT_BUFFERS_CREATED]++;
     return CL_SUCCESS;
 }
 
@@ -184,8 +184,8 @@ ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t o
     while (made_room(context->device, code));
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
-    context->device->bytes_to_device += bytes;
-    context->device->blocking_writes += !copy;
+    context->device->counts[OVOID_COUNT_BYTES_TO_DEVICE] += bytes;
+    context->device->counts[OVOID_COUNT_BLOCKING_WRITES] += !copy;
     return copy ? OVOID_OK : idle(context);
 }
 
@@ -209,8 +209,8 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
     while (made_room(context->device, code));
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
-    context->device->bytes_from_device += bytes;
-    context->device->blocking_reads++;
+    context->device->counts[OVOID_COUNT_BYTES_FROM_DEVICE] += bytes;
+    context->device->counts[OVOID_COUNT_BLOCKING_READS]++;
     return idle(context);
 }
 
@@ -228,7 +228,7 @@ ovoid_status ov_buffer_read_later(ovoid_context *context, const ov_buffer *buffe
         later->event = NULL;
         return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
     }
-    context->device->bytes_from_device += bytes;
+    context->device->counts[OVOID_COUNT_BYTES_FROM_DEVICE] += bytes;
     return OVOID_OK;
 }
 

@@ -337,38 +337,13 @@ const ovoid_device_info *ovoid_context_device(const ovoid_context *context) {
 
 uint64_t ovoid_context_count(const ovoid_context *context, ovoid_count what) {
     const ov_device *const device = context ? context->device : NULL;
-    if (!device)
-        return 0;
-    switch (what) {
-    case OVOID_COUNT_LAUNCHES:
-        return device->launches;
-    case OVOID_COUNT_BLOCKING_READS:
-        return device->blocking_reads;
-    case OVOID_COUNT_BLOCKING_WRITES:
-        return device->blocking_writes;
-    case OVOID_COUNT_BYTES_TO_DEVICE:
-        return device->bytes_to_device;
-    case OVOID_COUNT_BYTES_FROM_DEVICE:
-        return device->bytes_from_device;
-    case OVOID_COUNT_BUFFERS_CREATED:
-        return device->buffers_created;
-    case OVOID_COUNT_KERNELS_CREATED:
-        return device->kernels_created;
-    }
-    return 0;
+    return device && (unsigned)what < OVOID_COUNTS ? device->counts[what] : 0;
 }
 
-void ov_device_counted(const ov_device *device, const ovoid_fit_profile *before,
-                       ovoid_fit_profile *profile) {
-    static const ovoid_fit_profile nothing = {0};
-    const ovoid_fit_profile *const from = before ? before : &nothing;
-    profile->launches = device->launches - from->launches;
-    profile->blocking_reads = device->blocking_reads - from->blocking_reads;
-    profile->blocking_writes = device->blocking_writes - from->blocking_writes;
-    profile->bytes_to_device = device->bytes_to_device - from->bytes_to_device;
-    profile->bytes_from_device = device->bytes_from_device - from->bytes_from_device;
-    profile->buffers_created = device->buffers_created - from->buffers_created;
-    profile->kernels_created = device->kernels_created - from->kernels_created;
+void ov_device_counted(const ov_device *device, const uint64_t before[OVOID_COUNTS],
+                       uint64_t counts[OVOID_COUNTS]) {
+    for (size_t n = 0; n < OVOID_COUNTS; ++n)
+        counts[n] = device->counts[n] - (before ? before[n] : 0);
 }
 
 ovoid_status ov_device_get(ovoid_context *context, ov_device **device) {

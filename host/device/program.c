@@ -327,7 +327,7 @@ static ovoid_status make_kernel(ovoid_context *context, ov_device *device, ov_ke
     kernel->handle = clCreateKernel(handle, kernel->name, &code);
     if (code != CL_SUCCESS)
         return fail_create(context, kernel, code);
-    device->kernels_created++;
+    device->counts[OVOID_COUNT_KERNELS_CREATED]++;
     const char *call = "clGetKernelInfo";
     code = clGetKernelInfo(kernel->handle, CL_KERNEL_NUM_ARGS, sizeof arg_count, &arg_count, NULL);
     if (code == CL_SUCCESS) {

@@ -146,13 +146,13 @@ static bool report(const fit *f, uint64_t iteration, bool accuracy_phase, ov_l1_
         .iterations = f->options->l1.iterations,
         .ellipsoids = f->count,
         .points = f->objective.samples->points.count,
-        .accuracy_term = now.accuracy,
-        .sparse_term = sparse,
-        .accuracy_weight = w.accuracy,
-        .sparse_weight = w.sparse,
-        .objective = w.accuracy * now.accuracy + w.sparse * sparse,
-        .max_error = now.max_error,
-        .step = tau,
+        .l1 = {.accuracy_term = now.accuracy,
+               .sparse_term = sparse,
+               .accuracy_weight = w.accuracy,
+               .sparse_weight = w.sparse,
+               .objective = w.accuracy * now.accuracy + w.sparse * sparse,
+               .max_error = now.max_error,
+               .step = tau},
     };
     return ov_progress_report(f->objective.context, &progress);
 }
@@ -281,11 +281,11 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                        ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
-    ovoid_fit_profile before = {0};
+    uint64_t before[OVOID_COUNTS];
     ov_l1_evaluation last;
     fit f = {.options = options, .count = atoms};
     OV_TRY(ov_device_get(context, &device));
-    ov_device_counted(device, NULL, &before);
+    ov_device_counted(device, NULL, before);
     OV_TRY(allocate(&f, context, samples));
     initialise(&f, xyzr);
     OV_TRY(iterate(&f, &last, &result->iterations));
@@ -293,10 +293,10 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     OV_TRY(hand_over(&f, ellipsoids));
     result->points = samples->points.count;
     result->ellipsoids = f.count;
-    result->rms_error = sqrt(last.accuracy / (double)samples->points.count);
-    result->max_error = last.max_error;
-    result->profile = f.objective.profile;
-    ov_device_counted(device, &before, &result->profile);
+    result->l1 = f.objective.profile;
+    result->l1.rms_error = sqrt(last.accuracy / (double)samples->points.count);
+    result->l1.max_error = last.max_error;
+    ov_device_counted(device, before, result->counts);
 cleanup:
     destroy(&f);
     return status;

@@ -34,7 +34,7 @@ typedef struct ov_l1_objective {
     ov_lists lists;
     ov_operations operations;
     ov_buffer value, residual, pack_sums, moment_sums;
-    ovoid_fit_profile profile;
+    ovoid_l1_result profile; /* its seconds and counts */
 } ov_l1_objective;
 
 /* Room for up to `ellipsoids` of them. Samples with phi > limit only ask that phi~ does not fall

@@ -246,57 +246,75 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     chain[index] = (uint2)(first, entries);
 }
 
-/* Turns `count` numbers into where each begins when all are laid out one after the other, and
- * leaves zeros behind: a work-item takes a stretch of them. Returns the sum of all; every work-item
- * of the only work-group takes part. start may be null. */
-static inline ulong turn_to_starts(__global uint *number, const uint count, __global uint *start,
-                                   __local ulong *scratch) {
-    const uint at = get_local_id(0), size = get_local_size(0);
-    const uint each = (count + size - 1) / size, first = min(at * each, count);
-    const uint end = min(first + each, count);
-    ulong own = 0, before = 0, all = 0;
-    for (uint k = first; k < end; ++k)
-        own += number[k];
-    scratch[at] = own;
+/* The stretch of `count` numbers that a work-item of the only work-group takes: first and end. */
+static inline uint2 own_stretch(const uint count) {
+    const uint size = get_local_size(0), each = (count + size - 1) / size;
+    const uint first = min((uint)get_local_id(0) * each, count);
+    return (uint2)(first, min(first + each, count));
+}
+
+/* What the numbers of the stretches before this work-item's come to, and all of them. */
+static inline ulong2 sums_of(__global const uint *number, const uint count,
+                             __local ulong *scratch) {
+    const uint2 own = own_stretch(count);
+    ulong sum = 0;
+    ulong2 sums = 0;
+    for (uint k = own.x; k < own.y; ++k)
+        sum += number[k];
+    scratch[get_local_id(0)] = sum;
     barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint k = 0; k < size; ++k) {
-        before += k < at ? scratch[k] : 0;
-        all += scratch[k];
+    for (uint k = 0; k < get_local_size(0); ++k) {
+        sums.x += k < get_local_id(0) ? scratch[k] : 0;
+        sums.y += scratch[k];
     }
-    for (uint k = first; k < end; ++k) {
+    barrier(CLK_LOCAL_MEM_FENCE);
+    return sums;
+}
+
+/* Turns numbers into where each begins when all are laid out one after the other, or into zeros
+ * where there is no room for them, and leaves zeros behind. start may be null. */
+static inline void turn_to_starts(__global uint *number, const uint count, ulong before,
+                                  const bool fits, __global uint *start) {
+    const uint2 own = own_stretch(count);
+    for (uint k = own.x; k < own.y; ++k) {
         const uint one = number[k];
         number[k] = 0;
         if (start)
-            start[k] = (uint)before;
+            start[k] = fits ? (uint)before : 0;
         before += one;
     }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    return all;
 }
 
 /* Where everything that was counted begins. place: the bins, then the pairs of the groups. start:
- * the pairs of the terms, and where the last ones end. Either may be null. totals: chunks taken,
- * entries, and pairs as low and high half. The tally is zero afterwards, for the next time. One
- * work-group. */
-__kernel void scan_lists(const uint terms_count, const uint groups, __global uint *restrict tally,
-                         __global uint *restrict place, __global uint *restrict start,
-                         __global uint *restrict totals) {
+ * the pairs of the terms, and where the last ones end. Either may be null. room: for chunks,
+ * entries and pairs; where one does not suffice all lists are empty. totals: chunks taken, entries,
+ * pairs as low and high half, and whether there was room. The tally is zero afterwards, for the
+ * next time. One work-group. */
+__kernel void scan_lists(const uint terms_count, const uint groups, const uint4 room,
+                         __global uint *restrict tally, __global uint *restrict place,
+                         __global uint *restrict start, __global uint *restrict totals) {
     __local ulong scratch[OV_SCAN_GROUP];
     if (get_group_id(0) > 0)
         return;
-    const uint bins = groups * OV_BINS;
-    __global uint *const pairs = tally + 1 + bins;
-    const ulong entries = turn_to_starts(tally + 1, bins, place, scratch);
-    turn_to_starts(pairs, groups, place ? place + bins : place, scratch);
-    const ulong items = turn_to_starts(pairs + groups, terms_count, start, scratch);
+    const uint count = groups * OV_BINS, chunks = tally[0];
+    __global uint *const bins = tally + 1, *const pairs = bins + count;
+    __global uint *const terms = pairs + groups;
+    const ulong2 entries = sums_of(bins, count, scratch);
+    const ulong2 grouped = sums_of(pairs, groups, scratch);
+    const ulong2 items = sums_of(terms, terms_count, scratch);
+    const bool fits = chunks <= room.x && entries.y <= room.y && items.y <= room.z;
+    turn_to_starts(bins, count, entries.x, fits, place);
+    turn_to_starts(pairs, groups, grouped.x, fits, place ? place + count : place);
+    turn_to_starts(terms, terms_count, items.x, fits, start);
     if (get_local_id(0) > 0)
         return;
     if (start)
-        start[terms_count] = (uint)items;
-    totals[0] = tally[0];
-    totals[1] = (uint)entries;
-    totals[2] = (uint)items;
-    totals[3] = (uint)(items >> 32);
+        start[terms_count] = fits ? (uint)items.y : 0;
+    totals[0] = chunks;
+    totals[1] = (uint)entries.y;
+    totals[2] = (uint)items.y;
+    totals[3] = (uint)(items.y >> 32);
+    totals[4] = fits;
     tally[0] = 0;
 }
 
@@ -309,9 +327,10 @@ hand_out_entries(const uint terms_count, const uint block, __global const uint2 
                  __global const uint *restrict next, __global const uint *restrict entry_group,
                  __global const ushort *restrict entry_bits, __global const uint *restrict start,
                  __global uint *restrict item, __global uint *restrict place,
-                 __global uint *restrict group_term, __global ushort *restrict group_bits) {
+                 __global uint *restrict group_term, __global ushort *restrict group_bits,
+                 __global const uint *restrict totals) {
     const uint index = get_global_id(0);
-    if (index >= terms_count)
+    if (index >= terms_count || totals[4] == 0)
         return;
     const uint entries = chain[index].y;
     uint chunk = chain[index].x;

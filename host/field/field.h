@@ -160,6 +160,8 @@ typedef struct ov_lists {
     /* Scratch, kept for the next time (kernels/lists.cl). */
     ov_buffer tally, totals, chain, next, entry_group, entry_bits, place, group_term, group_bits;
     ov_kernel packs_of_terms, scan_lists, hand_out_entries, lists_of_packs;
+    ov_later later; /* the read of what they come to, between begin and end */
+    cl_uint told[5];
 } ov_lists;
 
 /* Pairs terms with the packs that they reach, boxes grown by skin and the term's own (angstrom).
@@ -167,6 +169,14 @@ typedef struct ov_lists {
  */
 ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
                             const ov_terms *terms, double skin);
+/* As ov_lists_build() without waiting, in the memory that the lists have got: ov_lists_end() is to
+ * follow, after failures too, and says whether that was enough. What is launched in between finds
+ * empty lists otherwise, and is to be done again after ov_lists_build(). */
+ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                            const ov_terms *terms, double skin);
+ovoid_status ov_lists_end(ovoid_context *context, ov_lists *lists, bool *whole);
+/* Whether lists were built in the memory before: ov_lists_begin() has something to begin with. */
+bool ov_lists_built(const ov_lists *lists);
 void ov_lists_destroy(ov_lists *lists);
 
 /* ---- operations --------------------------------------------------------------------------- */

@@ -63,8 +63,9 @@ static size_t chunks_held(const ov_lists *lists) {
     return chunks < UINT32_MAX ? chunks : UINT32_MAX;
 }
 
-/* What a walk comes to: chunks taken, entries, pairs as low and high half. */
-enum { CHUNKS, ENTRIES, ITEMS, ITEMS_HIGH, TOTALS };
+/* What a walk comes to: chunks taken, entries, pairs as low and high half, and whether all lists
+ * fitted. */
+enum { CHUNKS, ENTRIES, ITEMS, ITEMS_HIGH, FITS, TOTALS };
 
 /* Zeros at the beginning alone: who counts leaves them behind. */
 static ovoid_status reserve_tally(ovoid_context *context, ov_lists *lists, const plan *p) {
@@ -86,12 +87,11 @@ cleanup:
     return status;
 }
 
-/* One walk of all terms, and where what it counted begins. */
+/* One walk of all terms, and where what it counted begins. room: for chunks, entries and pairs. */
 static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_points *points,
-                         const ov_terms *terms, double skin, const plan *p,
-                         cl_uint totals[TOTALS]) {
+                         const ov_terms *terms, double skin, const plan *p, cl_uint4 room) {
     ovoid_status status = OVOID_OK;
-    const cl_uint room = (cl_uint)chunks_held(lists);
+    const cl_uint chunks = room.s[CHUNKS];
     const cl_float grow = (cl_float)(skin + (double)points->rounding);
     const cl_mem place = lists->terms_only ? NULL : lists->place.memory; /* null in the kernel */
     const cl_mem start = lists->packs_only ? NULL : lists->term_start.memory;
@@ -99,16 +99,27 @@ static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_point
     OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, p->terms, p->group, OV_ARG(p->terms),
                      OV_ARG(terms->device.memory), OV_ARG(points->tree),
                      OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(p->groups),
-                     OV_ARG(p->block), OV_ARG(room), OV_ARG(lists->tally.memory),
+                     OV_ARG(p->block), OV_ARG(chunks), OV_ARG(lists->tally.memory),
                      OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
                      OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory)));
     OV_TRY(OV_LAUNCH(context, &lists->scan_lists, p->scan, p->scan, OV_ARG(p->terms),
-                     OV_ARG(p->groups), OV_ARG(lists->tally.memory), OV_ARG(place), OV_ARG(start),
-                     OV_ARG(lists->totals.memory)));
-    OV_TRY(ov_buffer_read(context, &lists->totals, 0, totals, TOTALS * sizeof *totals));
+                     OV_ARG(p->groups), OV_ARG(room), OV_ARG(lists->tally.memory), OV_ARG(place),
+                     OV_ARG(start), OV_ARG(lists->totals.memory)));
 cleanup:
     if (status != OVOID_OK)
         ov_buffer_destroy(&lists->tally);
+    return status;
+}
+
+/* A walk with room for as many chunks as are held, and for whatever entries and pairs there are. */
+static ovoid_status count(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                          const ov_terms *terms, double skin, const plan *p,
+                          cl_uint totals[TOTALS]) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint4 room = {{(cl_uint)chunks_held(lists), UINT32_MAX, UINT32_MAX, 0}};
+    OV_TRY(walk(context, lists, points, terms, skin, p, room));
+    OV_TRY(ov_buffer_read(context, &lists->totals, 0, totals, TOTALS * sizeof *totals));
+cleanup:
     return status;
 }
 
@@ -136,10 +147,10 @@ static ovoid_status find_entries(ovoid_context *context, ov_lists *lists, const 
                                  cl_uint totals[TOTALS]) {
     ovoid_status status = OVOID_OK;
     OV_TRY(reserve_starts(context, lists, p));
-    OV_TRY(walk(context, lists, points, terms, skin, p, totals));
+    OV_TRY(count(context, lists, points, terms, skin, p, totals));
     if (totals[CHUNKS] > chunks_held(lists)) {
         OV_TRY(reserve_chunks(context, lists, totals[CHUNKS]));
-        OV_TRY(walk(context, lists, points, terms, skin, p, totals));
+        OV_TRY(count(context, lists, points, terms, skin, p, totals));
     }
     if (totals[ITEMS_HIGH] > 0)
         return ov_fail(context, OVOID_ERROR_LIMIT,
@@ -183,7 +194,7 @@ static ovoid_status make_lists(ovoid_context *context, ov_lists *lists, const pl
                      OV_ARG(p->block), OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
                      OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory),
                      OV_ARG(start), OV_ARG(item), OV_ARG(place), OV_ARG(group_term),
-                     OV_ARG(group_bits)));
+                     OV_ARG(group_bits), OV_ARG(lists->totals.memory)));
     if (packs)
         OV_TRY(OV_LAUNCH(context, &lists->lists_of_packs, p->groups, p->group, OV_ARG(p->groups),
                          OV_ARG(p->packs), OV_ARG(lists->place.memory),
@@ -207,6 +218,57 @@ ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_po
     OV_TRY(reserve_items(context, lists, &p, totals[ENTRIES]));
     OV_TRY(make_lists(context, lists, &p));
 cleanup:
+    return status;
+}
+
+/* ---- without waiting ------------------------------------------------------------------------ */
+
+bool ov_lists_built(const ov_lists *lists) {
+    return lists->next.memory && (lists->terms_only || lists->pack_item.memory) &&
+           (lists->packs_only || lists->term_item.memory);
+}
+
+/* Entries and pairs that there is room for. */
+static cl_uint4 rooms_of(const ov_lists *lists) {
+    size_t entries = UINT32_MAX, items = UINT32_MAX;
+    if (!lists->terms_only) {
+        const size_t bits = lists->group_bits.bytes / sizeof(cl_ushort);
+        entries = lists->group_term.bytes / sizeof(cl_uint);
+        entries = bits < entries ? bits : entries;
+        items = lists->pack_item.bytes / sizeof(cl_uint);
+    }
+    if (!lists->packs_only && lists->term_item.bytes / sizeof(cl_uint) < items)
+        items = lists->term_item.bytes / sizeof(cl_uint);
+    entries = entries < UINT32_MAX ? entries : UINT32_MAX;
+    items = items < UINT32_MAX ? items : UINT32_MAX;
+    return (cl_uint4){{(cl_uint)chunks_held(lists), (cl_uint)entries, (cl_uint)items, 0}};
+}
+
+ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                            const ov_terms *terms, double skin) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
+    OV_TRY(ov_device_get(context, &device));
+    const plan p = make_plan(device, lists, points, terms);
+    OV_TRY(prepare(context, lists));
+    lists->terms = terms->count;
+    lists->packs = points->packs;
+    OV_TRY(reserve_starts(context, lists, &p));
+    if (!lists->terms_only)
+        OV_TRY(ov_buffer_reserve(context, &lists->pack_start,
+                                 (p.packs + (size_t)1) * sizeof(cl_uint), "starts of lists"));
+    OV_TRY(walk(context, lists, points, terms, skin, &p, rooms_of(lists)));
+    OV_TRY(ov_buffer_read_later(context, &lists->totals, 0, lists->told, sizeof lists->told,
+                                &lists->later));
+    OV_TRY(make_lists(context, lists, &p));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_lists_end(ovoid_context *context, ov_lists *lists, bool *whole) {
+    const ovoid_status status = ov_later_end(context, &lists->later);
+    *whole = status == OVOID_OK && lists->told[FITS];
+    lists->items = *whole ? lists->told[ITEMS] : 0;
     return status;
 }
 

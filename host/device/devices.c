@@ -200,6 +200,7 @@ ovoid_status ov_devices_list(ovoid_context *context, ov_device_entry **entries, 
     cl_platform_id *ids = NULL;
     cl_uint found = 0;
     list all = {0};
+    OV_TRY(ov_opencl_begin(context));
     pthread_once(&prepared, prepare);
     cl_int code = clGetPlatformIDs(0, NULL, &found);
     if (code == CL_PLATFORM_NOT_FOUND_KHR)

@@ -13,6 +13,18 @@
 ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call,
                            const char *kernel, const char *device);
 
+/* ---- the process -------------------------------------------------------------------------- */
+
+/* Whether this process was forked from one that had used OpenCL. Then no OpenCL call may be made,
+ * nor anything released. */
+bool ov_opencl_lost(void);
+
+/* OVOID_ERROR_DEVICE where that is so. */
+ovoid_status ov_opencl_check(ovoid_context *context);
+
+/* The same, before the first call of OpenCL: from now on this process uses it. */
+ovoid_status ov_opencl_begin(ovoid_context *context);
+
 /* ---- text --------------------------------------------------------------------------------- */
 
 /* A growing text, or bytes; {0} is an empty one. `text` is NULL or ends with a null byte. */

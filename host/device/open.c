@@ -1,6 +1,7 @@
 #include "device/internal.h"
 
 #include "base/progress.h"
+#include "base/tenant.h"
 
 #include "shared.h"
 
@@ -212,13 +213,14 @@ static ovoid_status set_shape(ovoid_context *context, ov_device *device) {
 static void release(ov_device *device) {
     if (!device)
         return;
+    const bool lost = ov_opencl_lost();
     ov_programs_release(device);
-    if (device->queue) {
+    if (device->queue && !lost)
         clFinish(device->queue);
-        ov_profile_release(device);
+    ov_profile_release(device);
+    if (device->queue && !lost)
         clReleaseCommandQueue(device->queue);
-    }
-    if (device->context)
+    if (device->context && !lost)
         clReleaseContext(device->context);
     free(device->staged);
     free(device);
@@ -227,6 +229,7 @@ static void release(ov_device *device) {
 void ov_device_close(ovoid_context *context) {
     if (!context)
         return;
+    ov_tenants_leave(context);
     release(context->device);
     context->device = NULL;
     context->close_device = NULL;
@@ -301,5 +304,5 @@ ovoid_status ov_device_get(ovoid_context *context, ov_device **device) {
             return status;
     }
     *device = context->device;
-    return OVOID_OK;
+    return ov_opencl_check(context);
 }

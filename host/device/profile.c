@@ -41,6 +41,9 @@ ovoid_status ov_profile_drain(ovoid_context *context, ov_device *device) {
     ov_profile *profile = device->profile;
     if (!profile || profile->pending_count == 0)
         return OVOID_OK;
+    const ovoid_status status = ov_opencl_check(context);
+    if (status != OVOID_OK)
+        return status;
     /* The queue is in order: the last launch is the last to end. */
     const pending last = profile->pending[profile->pending_count - 1];
     cl_int code = clWaitForEvents(1, &last.event);
@@ -90,7 +93,7 @@ void ov_profile_release(ov_device *device) {
     ov_profile *profile = device->profile;
     if (!profile)
         return;
-    for (size_t i = 0; i < profile->pending_count; i++)
+    for (size_t i = 0; i < profile->pending_count && !ov_opencl_lost(); i++)
         clReleaseEvent(profile->pending[i].event);
     free(profile->kernels);
     free(profile);
@@ -154,6 +157,8 @@ ovoid_status ovoid_context_profile(ovoid_context *context, bool on) {
     ovoid_status status = OVOID_OK;
     OV_NEED(context, context);
     if (context->device)
+        status = ov_opencl_check(context);
+    if (context->device && status == OVOID_OK)
         status = on ? ov_profile_start(context, context->device) : stop(context, context->device);
     if (status == OVOID_OK)
         context->profile = on;

@@ -288,7 +288,8 @@ void ov_programs_release(ov_device *device) {
     while (device->programs) {
         struct ov_program *program = device->programs;
         device->programs = program->next;
-        clReleaseProgram(program->handle);
+        if (!ov_opencl_lost())
+            clReleaseProgram(program->handle);
         free(program);
     }
 }
@@ -331,7 +332,7 @@ ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const
 void ov_kernel_destroy(ov_kernel *kernel) {
     if (!kernel)
         return;
-    if (kernel->handle)
+    if (kernel->handle && !ov_opencl_lost())
         clReleaseKernel(kernel->handle);
     *kernel = (ov_kernel){0};
 }

@@ -7,6 +7,10 @@
 /* Points handled at once, which bounds the memory on the device. */
 #define PIECE ((size_t)1 << 20)
 
+/* Packs for which the host finds the terms. Measured on 8,000 atoms (bench/points): with more, the
+ * device's lists are as fast. */
+#define FEW_PACKS 24
+
 /* Cells of the curve along which points are put in packs, angstrom. */
 #define CELL 1.0
 
@@ -43,7 +47,7 @@ static void find_box(ov_evaluator *e, const ov_quadric *quadrics, size_t count) 
 
 ovoid_status ov_evaluator_create(ovoid_context *context, const ov_quadric *quadrics, size_t count,
                                  ov_evaluator *evaluator) {
-    ov_evaluator made = {.lists.packs_only = true};
+    ov_evaluator made = {.quadrics = quadrics, .count = count, .lists.packs_only = true};
     find_middle(&made, quadrics, count);
     find_box(&made, quadrics, count);
     const ovoid_status status =
@@ -58,6 +62,7 @@ ovoid_status ov_evaluator_create(ovoid_context *context, const ov_quadric *quadr
 void ov_evaluator_destroy(ov_evaluator *evaluator) {
     ov_terms_destroy(&evaluator->terms);
     ov_lists_destroy(&evaluator->lists);
+    ov_near_destroy(&evaluator->near);
     ov_operations_destroy(&evaluator->operations);
     ov_buffer_destroy(&evaluator->value);
     ov_buffer_destroy(&evaluator->gradient);
@@ -94,6 +99,18 @@ cleanup:
     return status;
 }
 
+static ovoid_status pair(ovoid_context *context, ov_evaluator *e, const ov_points *points) {
+    ovoid_status status = OVOID_OK;
+    if (points->packs > FEW_PACKS)
+        return ov_lists_build(context, &e->lists, points, &e->terms, 0.0);
+    if (!e->near.term)
+        OV_TRY(
+            ov_near_create(context, e->quadrics, e->count, e->origin, OV_TARGET_CUTOFF, &e->near));
+    OV_TRY(ov_near_lists(context, &e->near, points, e->xyz, &e->lists));
+cleanup:
+    return status;
+}
+
 /* Values, and gradients if they are wanted, at the packs, into e->results. */
 static ovoid_status evaluate_packs(ovoid_context *context, ov_evaluator *e, const ov_points *points,
                                    bool with_gradient) {
@@ -101,7 +118,7 @@ static ovoid_status evaluate_packs(ovoid_context *context, ov_evaluator *e, cons
     const size_t values = points->packs * OV_PACK;
     OV_TRY(ov_grow(context, &e->results, &e->results_capacity, values * (with_gradient ? 4 : 1),
                    sizeof *e->results, "values at points"));
-    OV_TRY(ov_lists_build(context, &e->lists, points, &e->terms, 0.0));
+    OV_TRY(pair(context, e, points));
     if (with_gradient)
         OV_TRY(ov_field_gradient(context, &e->operations, points, &e->terms, &e->lists, &e->value,
                                  &e->gradient));
@@ -158,36 +175,12 @@ cleanup:
     return status;
 }
 
-/* ---- once --------------------------------------------------------------------------------- */
+/* ---- checks ------------------------------------------------------------------------------- */
 
-static ovoid_status check_points(ovoid_context *context, const double *xyz, size_t count) {
+ovoid_status ov_points_check(ovoid_context *context, const double *xyz, size_t count) {
     for (size_t k = 0; k < 3 * count; ++k)
         if (!isfinite(xyz[k]))
             return ov_fail(context, OVOID_ERROR_ARGUMENT,
                            "point %zu has a coordinate that is not finite", k / 3);
     return OVOID_OK;
-}
-
-ovoid_status ov_evaluate(ovoid_context *context, const ov_quadric *quadrics, size_t quadric_count,
-                         const double *xyz, size_t count, double *value, double *gradient) {
-    ovoid_status status = OVOID_OK;
-    ov_evaluator e = {0};
-    float *results = NULL; /* of all points, so that on failure the caller's stay as they are */
-    if (count == 0)
-        return OVOID_OK;
-    OV_TRY(check_points(context, xyz, count));
-    results = ov_alloc(context, count, (gradient ? 4 : 1) * sizeof *results, "values at points");
-    if (!results)
-        return OVOID_ERROR_MEMORY;
-    float *const slopes = gradient ? results + count : NULL;
-    OV_TRY(ov_evaluator_create(context, quadrics, quadric_count, &e));
-    OV_TRY(ov_evaluator_run(context, &e, xyz, count, results, slopes));
-    for (size_t k = 0; k < count; ++k)
-        value[k] = results[k];
-    for (size_t k = 0; gradient && k < 3 * count; ++k)
-        gradient[k] = slopes[k];
-cleanup:
-    ov_evaluator_destroy(&e);
-    free(results);
-    return status;
 }

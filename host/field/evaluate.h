@@ -2,14 +2,17 @@
 #ifndef OV_EVALUATE_H
 #define OV_EVALUATE_H
 
-#include "field/field.h"
+#include "field/near.h"
 
 /* Terms on the device, and what else calls share. Starts as {0}. */
 typedef struct ov_evaluator {
-    double origin[3];       /* of the terms, angstrom */
+    double origin[3];           /* of the terms, angstrom */
+    const ov_quadric *quadrics; /* not owned */
+    size_t count;
     double low[3], high[3]; /* beyond this box no term reaches the cut-off */
     ov_terms terms;
     ov_lists lists;
+    ov_near near; /* for few points; empty before the first of them */
     ov_operations operations;
     ov_buffer value, gradient;
     double *xyz;     /* of a piece's points within the box */
@@ -19,7 +22,7 @@ typedef struct ov_evaluator {
     size_t results_capacity;
 } ov_evaluator;
 
-/* The quadrics are not kept. Needs a device. */
+/* The quadrics stay as long as the evaluator. Needs a device. */
 ovoid_status ov_evaluator_create(ovoid_context *context, const ov_quadric *quadrics, size_t count,
                                  ov_evaluator *evaluator);
 void ov_evaluator_destroy(ov_evaluator *evaluator);
@@ -30,8 +33,7 @@ void ov_evaluator_destroy(ov_evaluator *evaluator);
 ovoid_status ov_evaluator_run(ovoid_context *context, ov_evaluator *evaluator, const double *xyz,
                               size_t count, float *value, float *gradient);
 
-/* As ov_evaluator_run(), once, for points that need not be finite. */
-ovoid_status ov_evaluate(ovoid_context *context, const ov_quadric *quadrics, size_t quadric_count,
-                         const double *xyz, size_t count, double *value, double *gradient);
+/* OVOID_ERROR_ARGUMENT where a coordinate is not finite. */
+ovoid_status ov_points_check(ovoid_context *context, const double *xyz, size_t count);
 
 #endif

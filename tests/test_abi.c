@@ -185,7 +185,8 @@ static void results_are_of_their_method(void **state) {
         test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
         const bool l1 = method == OVOID_METHOD_L1;
         assert_int_equal(result.method, method);
-        assert_true(result.launches > 0 && result.launches != OVOID_UNKNOWN);
+        assert_true(result.counts[OVOID_COUNT_LAUNCHES] > 0 &&
+                    result.counts[OVOID_COUNT_LAUNCHES] != OVOID_UNKNOWN);
         assert_int_equal(isnan(result.l1.rms_error), !l1);
         assert_int_equal(isnan(result.l1.host_seconds), !l1);
         assert_int_equal(result.l1.field_passes == OVOID_UNKNOWN, !l1);

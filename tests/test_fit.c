@@ -95,7 +95,8 @@ static double fit_one(ovoid_context *context, const ovoid_molecule *molecule,
     assert_true(result.l1.list_builds >= 1);
     assert_true(result.l1.field_passes > result.iterations);
     assert_int_equal(result.l1.moments_passes, result.iterations);
-    assert_true(result.launches >= 2 * result.l1.field_passes + result.l1.moments_passes);
+    assert_true(result.counts[OVOID_COUNT_LAUNCHES] >=
+                2 * result.l1.field_passes + result.l1.moments_passes);
     expect_result(context, molecule, options, model, &result);
     ovoid_model_destroy(&model);
     return result.l1.max_error;

@@ -2,7 +2,50 @@
  * The paper's Algorithm 1, step by step, seen through its progress records and checked in double:
  * start, weights, gate, gradient step, line search, pruning, phases, end.
  */
+#include "fit/l1/objective.h"
 #include "support.h"
+
+/* ---- between the method and its objective ------------------------------------------------- */
+
+/* The linker hands calls of the objective to these (tests/CMakeLists.txt). */
+static struct {
+    double *x; /* evaluated last, `count` ellipsoids */
+    size_t count;
+    size_t gradients;   /* asked for */
+    size_t refuse_from; /* the gradient after which trials are refused, `refuse` of them; 0: none */
+    size_t refuse;
+} calls;
+
+ovoid_status __real_ov_l1_evaluate(ov_l1_objective *, const double *, size_t, ov_l1_evaluation *);
+ovoid_status __real_ov_l1_gradient(ov_l1_objective *, const double *, size_t, ov_l1_weights,
+                                   double *);
+ovoid_status __wrap_ov_l1_evaluate(ov_l1_objective *, const double *, size_t, ov_l1_evaluation *);
+ovoid_status __wrap_ov_l1_gradient(ov_l1_objective *, const double *, size_t, ov_l1_weights,
+                                   double *);
+
+ovoid_status __wrap_ov_l1_evaluate(ov_l1_objective *objective, const double *x, size_t count,
+                                   ov_l1_evaluation *result) {
+    const ovoid_status status = __real_ov_l1_evaluate(objective, x, count, result);
+    calls.x = realloc(calls.x, count * OV_L1_PARAMETERS * sizeof *x);
+    if (!calls.x)
+        abort();
+    memcpy(calls.x, x, count * OV_L1_PARAMETERS * sizeof *x);
+    calls.count = count;
+    if (calls.refuse_from && calls.gradients >= calls.refuse_from && calls.refuse) {
+        --calls.refuse;
+        return ov_fail(objective->context, OVOID_ERROR_NUMERIC, "no model");
+    }
+    return status;
+}
+
+/* The residual on the device, of which a gradient is made, is that of the parameters it is for. */
+ovoid_status __wrap_ov_l1_gradient(ov_l1_objective *objective, const double *x, size_t count,
+                                   ov_l1_weights w, double *gradient) {
+    ++calls.gradients;
+    assert_int_equal(count, calls.count);
+    assert_memory_equal(x, calls.x, count * OV_L1_PARAMETERS * sizeof *x);
+    return __real_ov_l1_gradient(objective, x, count, w, gradient);
+}
 
 typedef struct trace {
     ovoid_progress *records; /* one of each iteration */
@@ -508,6 +551,40 @@ static void inside_is_held(void **state) {
     assert_true(least_inside(*state, xyzr, atoms, 0) < 0.5);
 }
 
+/* ---- trials that are no model ------------------------------------------------------------- */
+
+/* Where the first trials of a search are no models, the search goes on with shorter steps; where
+ * none of them is, the iteration changes nothing, and the next one begins again at x. */
+static void refused_trials_are_rejected(void **state) {
+    const uint32_t backtracks = 4;
+    for (int whole = 0; whole < 2; ++whole) {
+        fit_run run;
+        ovoid_fit_options options = options_for(4, 4);
+        options.l1.first_step = OVOID_FIRST_STEP_GROW;
+        options.l1.max_backtracks = backtracks;
+        memset(&calls, 0, sizeof calls);
+        calls.refuse_from = 2;
+        calls.refuse = whole ? backtracks : 1;
+        run_fit(*state, clump, ATOMS, &options, &run);
+        assert_int_equal(calls.refuse, 0);
+        assert_int_equal(run.result.iterations, 4);
+        assert_int_equal(calls.gradients, 4);
+        const ovoid_progress *const r = run.trace.records;
+        assert_true(r[0].l1.step > 0.0);
+        if (whole) {
+            assert_true(r[1].l1.step == 0.0);
+            assert_true(r[1].l1.accuracy_term == r[0].l1.accuracy_term);
+        } else {
+            assert_true(r[1].l1.step > 0.0);
+            assert_true(r[1].l1.step <= options.l1.shrink * options.l1.grow * r[0].l1.step);
+        }
+        assert_true(r[2].l1.step > 0.0 && r[3].l1.step > 0.0);
+        destroy_run(&run);
+        free(calls.x);
+        memset(&calls, 0, sizeof calls);
+    }
+}
+
 /* ---- the end ------------------------------------------------------------------------------ */
 
 /* Where nothing can be gained the fit ends long before MaxNiter, with the atoms' own Gaussians. */
@@ -569,6 +646,7 @@ int main(void) {
         cmocka_unit_test(pruning_leaves_one),
         cmocka_unit_test(sparse_phase_shrinks_the_l1_term),
         cmocka_unit_test(inside_is_held),
+        cmocka_unit_test(refused_trials_are_rejected),
         cmocka_unit_test(ends_where_nothing_changes),
         cmocka_unit_test(result_is_the_last_record),
     };

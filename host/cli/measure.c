@@ -332,7 +332,9 @@ static bool fill_report(cJSON *json, const measure_job *job) {
         if (!good)
             cJSON_Delete(row);
     }
-    return good && cli_profile_report(&job->profile, json);
+    cJSON *counts = good ? cJSON_AddObjectToObject(json, "profile") : NULL;
+    return counts && cli_counts_report(job->profile.counts, counts) &&
+           cli_profile_report(&job->profile, json);
 }
 
 static ovoid_status write_report(const measure_job *job) {

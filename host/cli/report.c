@@ -157,8 +157,7 @@ static void add_profile(builder *b, const fit_job *job) {
         add_number(&profile, "field_passes", (double)spent->field_passes);
         add_number(&profile, "moments_passes", (double)spent->moments_passes);
     }
-    add_number(&profile, "launches", (double)result->launches);
-    b->good = profile.good;
+    b->good = profile.good && cli_counts_report(result->counts, profile.object);
 }
 
 cJSON *fit_report_make(const fit_job *job) {

@@ -15,6 +15,21 @@ bool ov_opencl_lost(void) {
     return user != 0 && user != (long)getpid();
 }
 
+void ov_release_memory(cl_mem memory) {
+    if (!ov_opencl_lost())
+        clReleaseMemObject(memory);
+}
+
+void ov_release_kernel(cl_kernel kernel) {
+    if (!ov_opencl_lost())
+        clReleaseKernel(kernel);
+}
+
+void ov_release_program(cl_program program) {
+    if (!ov_opencl_lost())
+        clReleaseProgram(program);
+}
+
 ovoid_status ov_opencl_check(ovoid_context *context) {
     if (!ov_opencl_lost())
         return OVOID_OK;

@@ -48,12 +48,13 @@ void ovoid_fit_result_init(ovoid_fit_result *result, size_t size) {
         .points = OVOID_UNKNOWN,
         .ellipsoids = OVOID_UNKNOWN,
         .iterations = OVOID_UNKNOWN,
-        .launches = OVOID_UNKNOWN,
         .distance = NAN,
         .sample_seconds = NAN,
         .fit_seconds = NAN,
         .l1 = {NAN, NAN, NAN, NAN, NAN, NAN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN},
         .adaptive = {OVOID_UNKNOWN},
+        .counts = {OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN,
+                   OVOID_UNKNOWN, OVOID_UNKNOWN},
     };
     ov_sized_init(result, size, &unknown, sizeof unknown);
 }

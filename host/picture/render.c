@@ -331,10 +331,10 @@ static ovoid_status launch_shade(painter *p, const scene *base, paint by, const 
     const cl_float4 key = to_float4(lights->key), fill = to_float4(lights->fill);
     const cl_float4 ambient_near_far_fade = to_float4(numbers);
     return OV_LAUNCH(
-        p->context, &p->shade, (size_t)width * height, ov_kernel_group(&p->shade, SHADE_GROUP),
-        OV_ARG(width), OV_ARG(height), OV_ARG(samples), OV_ARG(blocks), OV_ARG(spacing),
-        OV_ARG(hits->depth.memory), OV_ARG(hits->normal.memory), OV_ARG(hits->extra.memory),
-        OV_ARG(how), OV_ARG(p->palette.memory), OV_ARG(palette_size), OV_ARG(range), OV_ARG(glass),
+        p->context, &p->shade, (size_t)width * height, SHADE_GROUP, OV_ARG(width), OV_ARG(height),
+        OV_ARG(samples), OV_ARG(blocks), OV_ARG(spacing), OV_ARG(hits->depth.memory),
+        OV_ARG(hits->normal.memory), OV_ARG(hits->extra.memory), OV_ARG(how),
+        OV_ARG(p->palette.memory), OV_ARG(palette_size), OV_ARG(range), OV_ARG(glass),
         OV_ARG(glass_hits->depth.memory), OV_ARG(glass_hits->normal.memory), OV_ARG(own),
         OV_ARG(tint), OV_ARG(background), OV_ARG(haze), OV_ARG(key), OV_ARG(fill),
         OV_ARG(ambient_near_far_fade), OV_ARG(p->taps.memory), OV_ARG(taps), OV_ARG(reach),

@@ -199,6 +199,23 @@ OVOID_API ovoid_status ovoid_context_profile(ovoid_context *context, bool on);
 OVOID_API ovoid_status ovoid_context_kernel_times(ovoid_context *context, ovoid_kernel_time **times,
                                                   size_t *count);
 
+/* What is counted at the opened device. Bytes are those of copies between host and device. */
+typedef enum ovoid_count {
+    OVOID_COUNT_LAUNCHES,          /* kernels enqueued */
+    OVOID_COUNT_BLOCKING_READS,    /* copies from the device that the host waits for, and with them
+                                      for all that was enqueued before */
+    OVOID_COUNT_BLOCKING_WRITES,   /* copies to the device that the host waits for */
+    OVOID_COUNT_BYTES_TO_DEVICE,   /* of all copies, waited for or not */
+    OVOID_COUNT_BYTES_FROM_DEVICE, /* of all copies, waited for or not */
+    OVOID_COUNT_BUFFERS_CREATED,   /* allocations of device memory */
+    OVOID_COUNT_KERNELS_CREATED,   /* kernel objects made, each once for a device */
+    OVOID_COUNTS                   /* how many of them there are */
+} ovoid_count;
+
+/* How much of it there was since the device was opened; 0 before one is opened. Counting is always
+ * on and takes no time. */
+OVOID_API uint64_t ovoid_context_count(const ovoid_context *context, ovoid_count what);
+
 /* Frees memory that the library handed over; NULL is fine. */
 OVOID_API void ovoid_free(void *memory);
 

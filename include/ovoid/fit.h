@@ -137,7 +137,6 @@ typedef struct ovoid_fit_result {
     uint64_t points; /* constrained points */
     uint64_t ellipsoids;
     uint64_t iterations; /* done */
-    uint64_t launches;   /* kernels enqueued */
     bool reached; /* the goal, as measured: verdict is OVOID_VERDICT_REACHED, or there is none */
     ovoid_verdict verdict;
     double distance; /* largest between the outer surfaces, measured, angstrom: right to 1e-7 of the
@@ -147,6 +146,8 @@ typedef struct ovoid_fit_result {
     double fit_seconds;
     ovoid_l1_result l1;             /* of method l1, else NAN and OVOID_UNKNOWN */
     ovoid_adaptive_result adaptive; /* of method adaptive, else OVOID_UNKNOWN */
+    uint64_t counts[OVOID_COUNTS];  /* by ovoid_count: what the fit made of them, of l1 without
+                                       sampling */
 } ovoid_fit_result;
 
 /* Nothing known; size is sizeof *result. */

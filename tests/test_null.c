@@ -4,6 +4,7 @@
  */
 #include "support.h"
 
+#include "ovoid/opencl.h"
 #include "ovoid/ovoid.h"
 
 #include <ctype.h>
@@ -267,6 +268,28 @@ static void fields_and_models(void **state) {
     REFUSED(ovoid_fit, model, c, all.molecule, &options, NULL, NULL);
 }
 
+/* Handles that are never looked at: another argument is NULL. */
+static void opencl(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    cl_context const h = (cl_context)(void *)&all;
+    cl_device_id const d = (cl_device_id)(void *)&all;
+    cl_command_queue const q = (cl_command_queue)(void *)&all;
+    cl_mem const m = (cl_mem)(void *)&all;
+    REFUSED(ovoid_context_open_opencl, context, NULL, h, d, q);
+    REFUSED(ovoid_context_open_opencl, opencl, c, NULL, d, q);
+    REFUSED(ovoid_context_open_opencl, device, c, h, NULL, q);
+    REFUSED(ovoid_context_open_opencl, queue, c, h, d, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, context, NULL, all.field, xyzr, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, field, c, NULL, xyzr, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, xyz, c, all.field, NULL, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, value, c, all.field, xyzr, 1, NULL, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, context, NULL, all.field, m, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, field, c, NULL, m, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, xyz, c, all.field, NULL, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, value, c, all.field, m, 1, NULL, NULL);
+}
+
 static void meshes(void **state) {
     (void)state;
     ovoid_context *const c = all.context;
@@ -373,8 +396,9 @@ static size_t check_header(const char *path) {
 /* tests/project/symbols.sh sees to it that what is declared is what is exported. */
 static void no_function_is_left_out(void **state) {
     (void)state;
-    static const char *const headers[] = {"context", "export", "field", "file",     "fit",
-                                          "measure", "mesh",   "model", "molecule", "picture"};
+    static const char *const headers[] = {"context",  "export",  "field",  "file",
+                                          "fit",      "measure", "mesh",   "model",
+                                          "molecule", "opencl",  "picture"};
     size_t found = 0;
     for (size_t i = 0; i < sizeof headers / sizeof *headers; ++i) {
         char path[4096];
@@ -394,6 +418,7 @@ int main(void) {
         cmocka_unit_test(molecules),
         cmocka_unit_test(files),
         cmocka_unit_test(fields_and_models),
+        cmocka_unit_test(opencl),
         cmocka_unit_test(meshes),
         cmocka_unit_test(exports_and_pictures),
         cmocka_unit_test(no_function_is_left_out),

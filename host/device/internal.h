@@ -65,6 +65,19 @@ typedef struct ov_device_entry {
 ovoid_status ov_devices_list(ovoid_context *context, ov_device_entry **entries, size_t *count,
                              size_t *platforms);
 
+/* Describes a device that the caller has found; its index is UINT32_MAX. */
+ovoid_status ov_device_describe(ovoid_context *context, cl_device_id id, ov_device_entry *entry);
+
+/* What a caller hands over with a device. */
+typedef struct ov_handles {
+    cl_context context;
+    cl_command_queue queue;
+} ov_handles;
+
+/* Opens the device in the place of the one that was; handles NULL: with a queue of its own. */
+ovoid_status ov_device_open(ovoid_context *context, const ov_device_entry *entry,
+                            const ov_handles *handles);
+
 /* "cpu", "gpu", "accelerator", "other". */
 const char *ov_device_type_name(ovoid_device_type type);
 
@@ -120,6 +133,10 @@ void ov_pool_own(ov_pool *pool, cl_mem memory, size_t bytes, ov_buffer *buffer);
 /* Takes a buffer back, which is not to be used any more. The queue is in order: what still works on
  * it ends before whatever the next owner asks for. */
 void ov_pool_put(ov_buffer *buffer);
+
+/* ---- the caller's queue ------------------------------------------------------------------- */
+
+bool ov_queue_is_timed(cl_command_queue queue);
 
 /* ---- profile ------------------------------------------------------------------------------ */
 

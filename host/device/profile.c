@@ -106,6 +106,11 @@ static ovoid_status replace_queue(ovoid_context *context, ov_device *device, boo
                                   bool *refused) {
     const char *call = "clFinish";
     cl_int code = clFinish(device->queue);
+    if (device->borrowed) { /* the caller's is as it is */
+        *refused = timed && !ov_queue_is_timed(device->queue);
+        return code == CL_SUCCESS ? OVOID_OK
+                                  : ov_cl_fail_on(context, code, call, NULL, device->info.name);
+    }
     if (code == CL_SUCCESS) {
         call = "clCreateCommandQueue";
         cl_command_queue queue = clCreateCommandQueue(device->context, device->id,

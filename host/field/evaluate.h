@@ -14,7 +14,8 @@ typedef struct ov_evaluator {
     ov_lists lists;
     ov_near near; /* for few points; empty before the first of them */
     ov_operations operations;
-    ov_buffer value, gradient;
+    ov_kernel spread;
+    ov_buffer value, gradient, to;
     double *xyz;     /* of a piece's points within the box */
     uint32_t *index; /* which of the piece's they are */
     size_t xyz_capacity, index_capacity;
@@ -32,6 +33,15 @@ void ov_evaluator_destroy(ov_evaluator *evaluator);
  * may be set. */
 ovoid_status ov_evaluator_run(ovoid_context *context, ov_evaluator *evaluator, const double *xyz,
                               size_t count, float *value, float *gradient);
+
+/* Points that are evaluated at once, which bounds the memory on the device. */
+#define OV_EVALUATE_PIECE ((size_t)1 << 20)
+
+/* Of at most OV_EVALUATE_PIECE points, into the caller's buffers: floats of the points from `first`
+ * on, as ovoid_field_evaluate_opencl() has them; where no term reaches the cut-off they stay as
+ * they are. Does not wait. gradient may be NULL. */
+ovoid_status ov_evaluator_put(ovoid_context *context, ov_evaluator *evaluator, const double *xyz,
+                              size_t count, size_t first, cl_mem value, cl_mem gradient);
 
 /* OVOID_ERROR_ARGUMENT where a coordinate is not finite. */
 ovoid_status ov_points_check(ovoid_context *context, const double *xyz, size_t count);

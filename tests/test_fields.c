@@ -79,6 +79,26 @@ static void one_point_after_another(void **state) {
     assert_null(field);
 }
 
+/* What the first call has put on the device stays there. */
+static void later_calls_pay_for_their_points_alone(void **state) {
+    ovoid_field *field = field_of_chain(*state);
+    double at[3], value, gradient[3];
+    place(9, at);
+    test_check(*state, ovoid_field_evaluate(*state, field, at, 1, &value, gradient));
+    test_check(*state, ovoid_field_evaluate(*state, field, at, 1, &value, NULL));
+    const uint64_t launches = ovoid_context_count(*state, OVOID_COUNT_LAUNCHES);
+    const uint64_t bytes = ovoid_context_count(*state, OVOID_COUNT_BYTES_TO_DEVICE);
+    const uint64_t kernels = ovoid_context_count(*state, OVOID_COUNT_KERNELS_CREATED);
+    for (int k = 0; k < 10; ++k)
+        test_check(*state,
+                   ovoid_field_evaluate(*state, field, at, 1, &value, k % 2 ? gradient : NULL));
+    assert_int_equal(ovoid_context_count(*state, OVOID_COUNT_LAUNCHES), launches + 10);
+    assert_int_equal(ovoid_context_count(*state, OVOID_COUNT_KERNELS_CREATED), kernels);
+    /* A pack, its box in a tree, and the terms near it; all terms would take 19 kB a call. */
+    assert_true(ovoid_context_count(*state, OVOID_COUNT_BYTES_TO_DEVICE) < bytes + 10 * 1500);
+    ovoid_field_destroy(&field);
+}
+
 /* Few points find their terms on the host, many on the device: they agree. */
 static void few_and_many_agree(void **state) {
     const size_t count = test_size(2000, 400);
@@ -300,6 +320,7 @@ static void bad_arguments(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_point_after_another),
+        cmocka_unit_test(later_calls_pay_for_their_points_alone),
         cmocka_unit_test(few_and_many_agree),
         cmocka_unit_test(every_kind_of_model),
         cmocka_unit_test(far_away_there_is_nothing),

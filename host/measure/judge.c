@@ -1,5 +1,4 @@
 #include "measure/judge.h"
-#include "measure/distance.h"
 #include "mesh/march.h"
 #include "model/factor.h"
 
@@ -51,28 +50,42 @@ static bool has_outer(const ovoid_mesh *mesh) {
     return false;
 }
 
-ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
-                             double isovalue, double spacing, ov_watch watch, ov_judge *judge) {
-    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay), .watch = watch};
-    ov_body *const bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
+static ovoid_status mesh_original(ov_judge *judge, const double *xyzr, size_t atoms, double decay) {
+    ov_body *const bodies = ov_alloc(judge->context, atoms, sizeof *bodies, "atoms");
     if (!bodies)
         return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < atoms; ++i)
+        ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
+    const ovoid_status status = mesh_bodies(judge, bodies, atoms, &judge->mesh, &judge->content);
+    free(bodies);
+    return status;
+}
+
+ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                             double isovalue, double spacing, ov_watch watch, ov_judge *judge) {
+    ovoid_status status = OVOID_OK;
+    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay), .watch = watch};
     ovoid_mesh_options_init(&made.meshing);
     made.meshing.isovalue = isovalue;
     made.meshing.spacing = spacing;
     middle_of(xyzr, atoms, made.origin);
-    for (size_t i = 0; i < atoms; ++i)
-        ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
-    const ovoid_status status = mesh_bodies(&made, bodies, atoms, &made.mesh, &made.content);
-    free(bodies);
-    if (status == OVOID_OK)
-        *judge = made;
-    else
+    OV_TRY(mesh_original(&made, xyzr, atoms, decay));
+    if (made.mesh) {
+        OV_TRY(ov_trail_create(context, made.mesh, false, &made.trail));
+        OV_TRY(ov_facets_set(context, &made.facets, &made.trail, made.origin));
+    }
+    *judge = made;
+cleanup:
+    if (status != OVOID_OK)
         ov_judge_destroy(&made);
     return status;
 }
 
 void ov_judge_destroy(ov_judge *judge) {
+    ov_meter_destroy(&judge->meter);
+    ov_facets_destroy(&judge->facets);
+    ov_facets_destroy(&judge->other);
+    ov_trail_destroy(&judge->trail);
     ovoid_mesh_destroy(&judge->mesh);
     memset(judge, 0, sizeof *judge);
 }
@@ -159,6 +172,7 @@ static void trial_destroy(trial *t) {
 
 static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
     ovoid_status status = OVOID_OK;
+    ov_trail trail = {0};
     ovoid_context *const context = judge->context;
     t->from_original =
         ov_alloc(context, judge->mesh->vertices, sizeof *t->from_original, "distances");
@@ -167,11 +181,15 @@ static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    OV_TRY(ov_vertex_distances(context, judge->mesh, t->mesh, judge->origin, enough, &judge->watch,
-                               t->from_original));
-    OV_TRY(ov_vertex_distances(context, t->mesh, judge->mesh, judge->origin, enough, &judge->watch,
-                               t->from_model));
+    judge->meter.watch = &judge->watch;
+    judge->meter.enough = enough;
+    OV_TRY(ov_trail_create(context, t->mesh, false, &trail));
+    OV_TRY(ov_facets_set(context, &judge->other, &trail, judge->origin));
+    OV_TRY(
+        ov_trail_distances(context, &judge->meter, &judge->other, &judge->trail, t->from_original));
+    OV_TRY(ov_trail_distances(context, &judge->meter, &judge->facets, &trail, t->from_model));
 cleanup:
+    ov_trail_destroy(&trail);
     return status;
 }
 

@@ -40,16 +40,15 @@ typedef struct marcher {
     ov_terms terms;
     ov_lists lists;
     ov_operations operations;
-    ov_kernel signs, count, get, put, fill_vertices, fill_triangles, refine;
-    ov_buffer value, sign, crossing, triangle_count, cases, list, edge, t, normal, corners;
+    ov_kernel signs, count, get, put, fill_vertices, fill_boxes, fill_triangles, refine;
+    ov_buffer value, sign, crossing, found, box, cases, list, edge, t, normal, corners;
     ov_buffer face_list, ghost_list, place, values, crossings;
     size_t group;
     cl_uint run;
 
     ov_quadric *quadrics; /* of one piece */
     size_t quadrics_capacity;
-    cl_uint *host_crossing; /* of the padded grid */
-    cl_uint *host_count;    /* triangles of each brick */
+    cl_uint *host_found; /* vertices and triangles of each brick, as of march_count() */
     float *ghost_value;
     cl_uint *ghost_crossing;
     bool ghosts_empty; /* on the device */
@@ -57,8 +56,9 @@ typedef struct marcher {
     size_t active_count;
     cl_uint *edges; /* of the piece's vertices, in packs */
     size_t edges_capacity;
+    cl_int *lattice_boxes; /* of packs of vertices, in lattice points and in angstrom */
     float *boxes, *refined;
-    size_t boxes_capacity, refined_capacity;
+    size_t lattice_boxes_capacity, boxes_capacity, refined_capacity;
     float largest; /* value met while there was no vertex */
 
     double *xyz;    /* the mesh so far, */
@@ -76,11 +76,12 @@ typedef struct marcher {
 
 static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
     static const char *const names[] = {
-        "march_signs",    "march_count",     "march_get",    "march_put",
-        "march_vertices", "march_triangles", "march_refine",
+        "march_signs",    "march_count", "march_get",       "march_put",
+        "march_vertices", "march_boxes", "march_triangles", "march_refine",
     };
-    ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
-                                  &m->fill_vertices, &m->fill_triangles, &m->refine};
+    ov_kernel *const kernels[] = {
+        &m->signs,      &m->count,          &m->get,   &m->put, &m->fill_vertices,
+        &m->fill_boxes, &m->fill_triangles, &m->refine};
     for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k) {
         const ovoid_status status = ov_kernel_create(context, "march", names[k], kernels[k]);
         if (status != OVOID_OK)
@@ -108,21 +109,19 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     OV_TRY(ov_buffer_reserve(context, &m->sign, padded * sizeof(cl_uint), "signs of bricks"));
     OV_TRY(ov_buffer_reserve(context, &m->crossing, padded * CROSSING * sizeof(cl_uint),
                              "crossings of bricks"));
-    OV_TRY(ov_buffer_reserve(context, &m->triangle_count, grid->total * sizeof(cl_uint),
-                             "triangles of bricks"));
+    OV_TRY(
+        ov_buffer_reserve(context, &m->found, grid->total * sizeof(cl_uint), "vertices of bricks"));
     OV_TRY(
         ov_buffer_reserve(context, &m->values, moved * OV_PACK * sizeof(float), "values at faces"));
     OV_TRY(ov_buffer_reserve(context, &m->crossings, moved * CROSSING * sizeof(cl_uint),
                              "crossings at faces"));
-    m->host_crossing = ov_alloc(context, padded * CROSSING, sizeof(cl_uint), "crossings of bricks");
-    m->host_count = ov_alloc(context, grid->total, sizeof(cl_uint), "triangles of bricks");
+    m->host_found = ov_alloc(context, grid->total, sizeof(cl_uint), "vertices of bricks");
     m->active = ov_alloc(context, grid->total * 4, sizeof(cl_uint), "bricks at the surface");
     m->ghost_value = ov_alloc(context, moved * OV_PACK, sizeof(float), "values at faces");
     m->ghost_crossing = ov_alloc(context, moved * CROSSING, sizeof(cl_uint), "crossings at faces");
     m->faces = ov_alloc(context, m->pieces.pieces, sizeof *m->faces, "pieces of the lattice");
     m->faces_end = m->pieces.pieces;
-    if (!m->host_crossing || !m->host_count || !m->active || !m->ghost_value ||
-        !m->ghost_crossing || !m->faces)
+    if (!m->host_found || !m->active || !m->ghost_value || !m->ghost_crossing || !m->faces)
         status = OVOID_ERROR_MEMORY;
 cleanup:
     return status;
@@ -231,12 +230,12 @@ static ovoid_status keep_faces(ovoid_context *context, marcher *m, size_t piece)
     if (!kept->value || !kept->crossing)
         return OVOID_ERROR_MEMORY;
     OV_TRY(OV_LAUNCH(context, &m->get, faces, m->group, OV_ARG(count), OV_ARG(m->face_list.memory),
-                     OV_ARG(m->place.memory), OV_ARG(m->value.memory), OV_ARG(m->values.memory)));
+                     OV_ARG(m->place.memory), OV_ARG(m->value.memory), OV_ARG(m->crossing.memory),
+                     OV_ARG(m->values.memory), OV_ARG(m->crossings.memory)));
     OV_TRY(
         ov_buffer_read(context, &m->values, 0, kept->value, faces * OV_PACK * sizeof *kept->value));
-    for (size_t k = 0; k < faces; ++k)
-        memcpy(kept->crossing + k * CROSSING, m->host_crossing + grid->face[k] * CROSSING,
-               CROSSING * sizeof *kept->crossing);
+    OV_TRY(ov_buffer_read(context, &m->crossings, 0, kept->crossing,
+                          faces * CROSSING * sizeof *kept->crossing));
 cleanup:
     return status;
 }
@@ -281,13 +280,6 @@ cleanup:
     return status;
 }
 
-static size_t bits_in(cl_uint mask) {
-    size_t count = 0;
-    for (; mask; mask &= mask - 1)
-        ++count;
-    return count;
-}
-
 /* Numbers vertices and triangles along the curve, and lists the bricks that have some. */
 static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
     const ov_brick_grid *const grid = &m->grid;
@@ -296,19 +288,16 @@ static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
     m->active_count = 0;
     for (size_t i = 0; i < grid->total; ++i) {
         const uint32_t k = grid->curve[i];
-        const cl_uint brick = ov_brick_number(grid, k % nx, k / nx % ny, k / (nx * ny));
-        cl_uint *const crossing = m->host_crossing + (size_t)brick * CROSSING;
-        const size_t own = bits_in(crossing[1]) + bits_in(crossing[2]) + bits_in(crossing[3]);
-        crossing[0] = (cl_uint)(m->vertices + vertices);
-        if (own == 0 && m->host_count[k] == 0)
+        const cl_uint found = m->host_found[k];
+        if (found == 0)
             continue;
         cl_uint *const entry = m->active + 4 * m->active_count++;
-        entry[0] = brick;
+        entry[0] = ov_brick_number(grid, k % nx, k / nx % ny, k / (nx * ny));
         entry[1] = (cl_uint)vertices;
         entry[2] = (cl_uint)triangles;
-        entry[3] = 0;
-        vertices += own;
-        triangles += m->host_count[k];
+        entry[3] = (cl_uint)(m->vertices + vertices);
+        vertices += found & 255u;
+        triangles += found >> 8;
     }
     m->new_vertices = vertices;
     m->new_triangles = triangles;
@@ -330,12 +319,9 @@ static ovoid_status classify(ovoid_context *context, marcher *m) {
                      OV_ARG(m->value.memory), OV_ARG(m->sign.memory)));
     OV_TRY(OV_LAUNCH(context, &m->count, (grid->total + m->run - 1) / m->run, m->group, OV_ARG(nx),
                      OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->sign.memory),
-                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
-                     OV_ARG(m->triangle_count.memory)));
-    OV_TRY(ov_buffer_read(context, &m->crossing, 0, m->host_crossing,
-                          grid->padded_total * CROSSING * sizeof *m->host_crossing));
-    OV_TRY(ov_buffer_read(context, &m->triangle_count, 0, m->host_count,
-                          grid->total * sizeof *m->host_count));
+                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory), OV_ARG(m->found.memory)));
+    OV_TRY(
+        ov_buffer_read(context, &m->found, 0, m->host_found, grid->total * sizeof *m->host_found));
     OV_TRY(number_bricks(context, m));
 cleanup:
     return status;
@@ -349,27 +335,30 @@ static cl_uint read_edge(cl_uint edge, cl_uint at[3]) {
     return edge >> 20 & 3u;
 }
 
-/* The box of each pack of vertices, wherever on their edges they come to lie. */
-static void box_packs(const marcher *m, size_t packs) {
-    for (size_t pack = 0; pack < packs; ++pack) {
-        float *const box = m->boxes + pack * BOX;
-        for (size_t j = 0; j < OV_PACK; ++j) {
-            cl_uint at[3];
-            const cl_uint along = read_edge(m->edges[pack * OV_PACK + j], at);
-            for (cl_uint axis = 0; axis < 3; ++axis) {
-                const float low = (float)(at[axis] * m->pieces.spacing);
-                const float high = (float)((at[axis] + (axis == along)) * m->pieces.spacing);
-                box[axis] = j == 0 ? low : fminf(box[axis], low);
-                box[axis + 3] = j == 0 ? high : fmaxf(box[axis + 3], high);
-            }
-        }
-    }
+/* The box of each pack of vertices. */
+static ovoid_status box_packs(ovoid_context *context, marcher *m, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint packs_count = (cl_uint)packs, vertices = (cl_uint)m->new_vertices;
+    OV_TRY(ov_buffer_reserve(context, &m->box, packs * BOX * sizeof(cl_int), "boxes of vertices"));
+    OV_TRY(OV_LAUNCH(context, &m->fill_boxes, packs, m->group, OV_ARG(packs_count),
+                     OV_ARG(vertices), OV_ARG(m->edge.memory), OV_ARG(m->t.memory),
+                     OV_ARG(m->box.memory)));
+    OV_TRY(ov_grow(context, &m->lattice_boxes, &m->lattice_boxes_capacity, packs * BOX,
+                   sizeof *m->lattice_boxes, "boxes of vertices"));
+    OV_TRY(ov_grow(context, &m->boxes, &m->boxes_capacity, packs * BOX, sizeof *m->boxes,
+                   "boxes of vertices"));
+    OV_TRY(ov_buffer_read(context, &m->box, 0, m->lattice_boxes,
+                          packs * BOX * sizeof *m->lattice_boxes));
+    for (size_t k = 0; k < packs * BOX; ++k)
+        m->boxes[k] = (float)(m->lattice_boxes[k] * m->pieces.spacing);
+cleanup:
+    return status;
 }
 
-/* Edges and first positions of the piece's vertices; the last pack is filled up with its last. */
+/* Edges, numbers and first positions of the piece's vertices. */
 static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t packs) {
     ovoid_status status = OVOID_OK;
-    const size_t count = m->new_vertices, room = packs * OV_PACK;
+    const size_t room = packs * OV_PACK;
     const cl_uint active = (cl_uint)m->active_count, nx = (cl_uint)m->grid.bricks[0],
                   ny = (cl_uint)m->grid.bricks[1];
     const cl_float isovalue = (cl_float)m->options->isovalue;
@@ -380,17 +369,6 @@ static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t pac
                      OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(isovalue),
                      OV_ARG(logarithmic), OV_ARG(m->place.memory), OV_ARG(m->value.memory),
                      OV_ARG(m->crossing.memory), OV_ARG(m->edge.memory), OV_ARG(m->t.memory)));
-    OV_TRY(ov_grow(context, &m->edges, &m->edges_capacity, room, sizeof *m->edges, "vertices"));
-    OV_TRY(
-        ov_grow(context, &m->refined, &m->refined_capacity, room, sizeof *m->refined, "vertices"));
-    OV_TRY(ov_buffer_read(context, &m->edge, 0, m->edges, count * sizeof *m->edges));
-    OV_TRY(ov_buffer_read(context, &m->t, 0, m->refined, count * sizeof *m->refined));
-    for (size_t k = count; k < room; ++k) {
-        m->edges[k] = m->edges[count - 1];
-        m->refined[k] = m->refined[count - 1];
-    }
-    OV_TRY(ov_buffer_write(context, &m->edge, 0, m->edges, room * sizeof *m->edges));
-    OV_TRY(ov_buffer_write(context, &m->t, 0, m->refined, room * sizeof *m->refined));
 cleanup:
     return status;
 }
@@ -401,9 +379,7 @@ static ovoid_status list_terms(ovoid_context *context, marcher *m, size_t packs)
     ov_points points = {.count = packs * OV_PACK, .packs = packs};
     float *tree = NULL;
     size_t floats = 0;
-    OV_TRY(ov_grow(context, &m->boxes, &m->boxes_capacity, packs * BOX, sizeof *m->boxes,
-                   "boxes of vertices"));
-    box_packs(m, packs);
+    OV_TRY(box_packs(context, m, packs));
     OV_TRY(ov_tree_build(context, m->boxes, packs, &points.tree, &tree, &floats));
     OV_TRY(ov_buffer_put(context, &points.boxes, tree, floats * sizeof *tree, "boxes of vertices"));
     OV_TRY(ov_lists_build(context, &m->lists, &points, &m->terms, 0.0));
@@ -463,6 +439,8 @@ static ovoid_status take_vertices(ovoid_context *context, marcher *m, size_t pac
                    "vertices"));
     OV_TRY(grow_vertices(context, m, total));
     float *const t = m->refined, *const normal = t + values;
+    OV_TRY(ov_grow(context, &m->edges, &m->edges_capacity, values, sizeof *m->edges, "vertices"));
+    OV_TRY(ov_buffer_read(context, &m->edge, 0, m->edges, m->new_vertices * sizeof *m->edges));
     OV_TRY(ov_buffer_read(context, &m->t, 0, t, values * sizeof *t));
     OV_TRY(ov_buffer_read(context, &m->normal, 0, normal, 3 * values * sizeof *normal));
     for (size_t k = 0; k < m->new_vertices; ++k) {
@@ -511,11 +489,10 @@ static ovoid_status take_piece(ovoid_context *context, marcher *m) {
         return OVOID_OK;
     OV_TRY(ov_buffer_put(context, &m->list, m->active, m->active_count * 4 * sizeof *m->active,
                          "bricks at the surface"));
-    OV_TRY(ov_buffer_write(context, &m->crossing, 0, m->host_crossing,
-                           m->grid.padded_total * CROSSING * sizeof *m->host_crossing));
+    if (m->new_vertices > 0)
+        OV_TRY(fill_vertices(context, m, packs));
     OV_TRY(take_triangles(context, m));
     if (m->new_vertices > 0) {
-        OV_TRY(fill_vertices(context, m, packs));
         OV_TRY(list_terms(context, m, packs));
         OV_TRY(refine(context, m, packs));
         OV_TRY(take_vertices(context, m, packs));
@@ -722,15 +699,16 @@ static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
 
 /* Frees all but the mesh. */
 static void release_work(marcher *m) {
-    ov_buffer *const buffers[] = {&m->value,  &m->sign,    &m->crossing,  &m->triangle_count,
-                                  &m->cases,  &m->list,    &m->edge,      &m->t,
-                                  &m->normal, &m->corners, &m->face_list, &m->ghost_list,
-                                  &m->place,  &m->values,  &m->crossings};
-    ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
-                                  &m->fill_vertices, &m->fill_triangles, &m->refine};
-    void *const memory[] = {m->quadrics,    m->host_crossing,  m->host_count,
-                            m->ghost_value, m->ghost_crossing, m->active,
-                            m->edges,       m->boxes,          m->refined};
+    ov_buffer *const buffers[] = {&m->value,      &m->sign,   &m->crossing, &m->found,
+                                  &m->box,        &m->cases,  &m->list,     &m->edge,
+                                  &m->t,          &m->normal, &m->corners,  &m->face_list,
+                                  &m->ghost_list, &m->place,  &m->values,   &m->crossings};
+    ov_kernel *const kernels[] = {
+        &m->signs,      &m->count,          &m->get,   &m->put, &m->fill_vertices,
+        &m->fill_boxes, &m->fill_triangles, &m->refine};
+    void *const memory[] = {m->quadrics,       m->host_found, m->ghost_value,
+                            m->ghost_crossing, m->active,     m->edges,
+                            m->lattice_boxes,  m->boxes,      m->refined};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
@@ -738,7 +716,8 @@ static void release_work(marcher *m) {
     for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
         free(memory[k]);
     m->quadrics = NULL;
-    m->host_crossing = m->host_count = m->ghost_crossing = m->active = m->edges = NULL;
+    m->host_found = m->ghost_crossing = m->active = m->edges = NULL;
+    m->lattice_boxes = NULL;
     m->ghost_value = m->boxes = m->refined = NULL;
     for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
         drop_faces(&m->faces[k]);

@@ -1,5 +1,4 @@
 #include "measure/judge.h"
-#include "mesh/march.h"
 #include "model/factor.h"
 
 #include <math.h>
@@ -17,8 +16,9 @@
  * *mesh is NULL where there is no surface. */
 static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
                                 ovoid_mesh **mesh, ov_content *content) {
-    const ovoid_status status = ov_mesh_bodies_light(judge->context, bodies, count, &judge->meshing,
-                                                     judge->origin, &judge->watch, mesh);
+    const ovoid_status status =
+        ov_mesh_bodies_light(judge->context, judge->marcher, bodies, count, &judge->meshing,
+                             judge->origin, &judge->watch, mesh);
     if (status == OVOID_OK) {
         if (content)
             *content = ov_mesh_smooth(*mesh, false);
@@ -69,6 +69,7 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     made.meshing.isovalue = isovalue;
     made.meshing.spacing = spacing;
     middle_of(xyzr, atoms, made.origin);
+    OV_TRY(ov_marcher_create(context, &made.marcher));
     OV_TRY(mesh_original(&made, xyzr, atoms, decay));
     if (made.mesh) {
         OV_TRY(ov_trail_create(context, made.mesh, false, &made.trail));
@@ -82,6 +83,7 @@ cleanup:
 }
 
 void ov_judge_destroy(ov_judge *judge) {
+    ov_marcher_destroy(&judge->marcher);
     ov_meter_destroy(&judge->meter);
     ov_facets_destroy(&judge->facets);
     ov_facets_destroy(&judge->other);

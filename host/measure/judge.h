@@ -6,7 +6,7 @@
 
 #include "field/quadric.h"
 #include "measure/distance.h"
-#include "mesh/mesh.h"
+#include "mesh/march.h"
 
 /* The original's surface, meshed once: a light mesh without normals, whose triangles stay on the
  * device. mesh is NULL where the field never reaches the isovalue. */
@@ -19,6 +19,7 @@ typedef struct ov_judge {
     ov_content content;
     double root_2d; /* sqrt(2 decay), angstrom^-1 */
     ov_watch watch; /* asked during whatever takes long */
+    ov_marcher *marcher;
     ov_meter meter;
     ov_facets facets; /* of the original */
     ov_facets other;  /* of the model at hand */

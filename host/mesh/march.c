@@ -7,6 +7,7 @@
 #include "mesh/specks.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,7 +25,8 @@ typedef struct piece_faces {
     cl_uint *crossing; /* CROSSING per face brick */
 } piece_faces;
 
-typedef struct marcher {
+/* What is of one mesh comes first, up to the grid; what follows may serve the next. */
+typedef struct ov_marcher {
     const ov_body *bodies;
     const ovoid_mesh_options *options;
     const double *origin; /* of the offsets of a light mesh, else NULL */
@@ -32,10 +34,23 @@ typedef struct marcher {
     ov_pieces pieces;
     piece_faces *faces; /* of each piece; empty where not needed, or no longer */
     size_t faces_end;   /* those from here on are gone */
-    ov_brick_grid grid;
-    uint64_t at[3]; /* the current piece */
+    uint64_t at[3];     /* the current piece */
     double corner[3];
+    float largest; /* value met while there was no vertex */
 
+    double *xyz;    /* the mesh so far, */
+    float *offsets; /* with these in place of xyz if it is light */
+    float *normals;
+    uint32_t *triangle;
+    uint8_t *edge_of; /* of the mesh's vertices, unless it is light */
+    size_t edge_of_capacity, missed;
+    size_t xyz_capacity, offsets_capacity, normals_capacity, triangle_capacity;
+    size_t vertices, triangles;
+    size_t new_vertices, new_triangles; /* of the piece */
+    bool ghosts_empty;                  /* on the device */
+
+    ov_brick_grid grid;
+    double grid_spacing; /* angstrom */
     ov_points points;
     ov_terms terms;
     ov_lists lists;
@@ -51,30 +66,22 @@ typedef struct marcher {
     cl_uint *host_found; /* vertices and triangles of each brick, as of march_count() */
     float *ghost_value;
     cl_uint *ghost_crossing;
-    bool ghosts_empty; /* on the device */
-    cl_uint *active;   /* entries of march_vertices()'s list */
+    cl_uint *active; /* entries of march_vertices()'s list */
     size_t active_count;
     cl_uint *edges; /* of the piece's vertices, in packs */
     size_t edges_capacity;
     cl_int *lattice_boxes; /* of packs of vertices, in lattice points and in angstrom */
     float *boxes, *refined;
     size_t lattice_boxes_capacity, boxes_capacity, refined_capacity;
-    float largest; /* value met while there was no vertex */
-
-    double *xyz;    /* the mesh so far, */
-    float *offsets; /* with these in place of xyz if it is light */
-    float *normals;
-    uint32_t *triangle;
-    uint8_t *edge_of; /* of the mesh's vertices, unless it is light */
-    size_t edge_of_capacity, missed;
-    size_t xyz_capacity, offsets_capacity, normals_capacity, triangle_capacity;
-    size_t vertices, triangles;
-    size_t new_vertices, new_triangles; /* of the piece */
 } marcher;
+
+static const uint64_t brick_points[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
 /* ---- setting up --------------------------------------------------------------------------- */
 
 static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
+    if (m->refine.handle)
+        return OVOID_OK;
     static const char *const names[] = {
         "march_signs",    "march_count", "march_get",       "march_put",
         "march_vertices", "march_boxes", "march_triangles", "march_refine",
@@ -95,9 +102,6 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     const ov_brick_grid *const grid = &m->grid;
     const size_t padded = grid->padded_total, faces = grid->face_start[3];
     const size_t moved = faces > grid->ghosts ? faces : grid->ghosts;
-    ov_case_table cases;
-    ov_case_table_make(&cases);
-    OV_TRY(ov_buffer_put(context, &m->cases, &cases, sizeof cases, "cases of marching cubes"));
     OV_TRY(ov_buffer_put(context, &m->face_list, grid->face, faces * sizeof(cl_uint),
                          "lattice bricks"));
     OV_TRY(ov_buffer_put(context, &m->ghost_list, grid->ghost, grid->ghosts * sizeof(cl_uint),
@@ -119,10 +123,41 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     m->active = ov_alloc(context, grid->total * 4, sizeof(cl_uint), "bricks at the surface");
     m->ghost_value = ov_alloc(context, moved * OV_PACK, sizeof(float), "values at faces");
     m->ghost_crossing = ov_alloc(context, moved * CROSSING, sizeof(cl_uint), "crossings at faces");
-    m->faces = ov_alloc(context, m->pieces.pieces, sizeof *m->faces, "pieces of the lattice");
-    m->faces_end = m->pieces.pieces;
-    if (!m->host_found || !m->active || !m->ghost_value || !m->ghost_crossing || !m->faces)
+    if (!m->host_found || !m->active || !m->ghost_value || !m->ghost_crossing)
         status = OVOID_ERROR_MEMORY;
+cleanup:
+    return status;
+}
+
+static bool has_grid(const marcher *m) {
+    for (size_t axis = 0; axis < 3; ++axis)
+        if (m->grid.bricks[axis] * brick_points[axis] != m->pieces.size[axis])
+            return false;
+    return m->grid_spacing == m->pieces.spacing;
+}
+
+static void drop_grid(marcher *m) {
+    void *const memory[] = {m->host_found, m->active, m->ghost_value, m->ghost_crossing};
+    for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
+        free(memory[k]);
+    m->host_found = m->active = m->ghost_crossing = NULL;
+    m->ghost_value = NULL;
+    ov_brick_grid_destroy(&m->grid);
+    ov_points_destroy(&m->points);
+    m->grid_spacing = 0.0;
+}
+
+/* A grid of bricks for pieces of this size, unless the last mesh's is one. */
+static ovoid_status lay_grid(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    const double step[3] = {m->pieces.spacing, m->pieces.spacing, m->pieces.spacing};
+    if (has_grid(m))
+        return OVOID_OK;
+    drop_grid(m);
+    OV_TRY(ov_brick_grid_create(context, m->pieces.size, &m->grid));
+    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
+    OV_TRY(reserve_piece(context, m));
+    m->grid_spacing = m->pieces.spacing;
 cleanup:
     return status;
 }
@@ -130,14 +165,18 @@ cleanup:
 static ovoid_status set_up(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
-    const double step[3] = {m->pieces.spacing, m->pieces.spacing, m->pieces.spacing};
+    ov_case_table cases;
+    ov_case_table_make(&cases);
     OV_TRY(ov_device_get(context, &device));
     m->group = ov_item_group(device);
     m->run = device->shape.lanes == 1 ? BRICK_RUN : 1;
     OV_TRY(make_kernels(context, m));
-    OV_TRY(ov_brick_grid_create(context, m->pieces.size, &m->grid));
-    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
-    OV_TRY(reserve_piece(context, m));
+    OV_TRY(ov_buffer_put(context, &m->cases, &cases, sizeof cases, "cases of marching cubes"));
+    OV_TRY(lay_grid(context, m));
+    m->faces = ov_alloc(context, m->pieces.pieces, sizeof *m->faces, "pieces of the lattice");
+    m->faces_end = m->pieces.pieces;
+    if (!m->faces)
+        status = OVOID_ERROR_MEMORY;
 cleanup:
     return status;
 }
@@ -697,7 +736,21 @@ static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
 
 /* ---- all of it ---------------------------------------------------------------------------- */
 
-/* Frees all but the mesh. */
+/* Frees what the next mesh cannot use, the mesh itself among it. */
+static void end_mesh(marcher *m) {
+    for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
+        drop_faces(&m->faces[k]);
+    free(m->faces);
+    free(m->xyz);
+    free(m->offsets);
+    free(m->edge_of);
+    free(m->normals);
+    free(m->triangle);
+    ov_pieces_destroy(&m->pieces);
+    memset(m, 0, offsetof(marcher, grid));
+}
+
+/* Frees what it works with. */
 static void release_work(marcher *m) {
     ov_buffer *const buffers[] = {&m->value,      &m->sign,   &m->crossing, &m->found,
                                   &m->box,        &m->cases,  &m->list,     &m->edge,
@@ -706,38 +759,18 @@ static void release_work(marcher *m) {
     ov_kernel *const kernels[] = {
         &m->signs,      &m->count,          &m->get,   &m->put, &m->fill_vertices,
         &m->fill_boxes, &m->fill_triangles, &m->refine};
-    void *const memory[] = {m->quadrics,       m->host_found, m->ghost_value,
-                            m->ghost_crossing, m->active,     m->edges,
-                            m->lattice_boxes,  m->boxes,      m->refined};
+    void *const memory[] = {m->quadrics, m->edges, m->lattice_boxes, m->boxes, m->refined};
+    drop_grid(m);
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
         ov_kernel_destroy(kernels[k]);
     for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
         free(memory[k]);
-    m->quadrics = NULL;
-    m->host_found = m->ghost_crossing = m->active = m->edges = NULL;
-    m->lattice_boxes = NULL;
-    m->ghost_value = m->boxes = m->refined = NULL;
-    for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
-        drop_faces(&m->faces[k]);
-    free(m->faces);
-    m->faces = NULL;
-    ov_brick_grid_destroy(&m->grid);
-    ov_pieces_destroy(&m->pieces);
-    ov_points_destroy(&m->points);
     ov_terms_destroy(&m->terms);
     ov_lists_destroy(&m->lists);
     ov_operations_destroy(&m->operations);
-}
-
-static void destroy_marcher(marcher *m) {
-    release_work(m);
-    free(m->xyz);
-    free(m->offsets);
-    free(m->edge_of);
-    free(m->normals);
-    free(m->triangle);
+    memset((char *)m + offsetof(marcher, grid), 0, sizeof *m - offsetof(marcher, grid));
 }
 
 /* Gives back what growing has taken too much. */
@@ -811,38 +844,59 @@ cleanup:
     return status;
 }
 
-static ovoid_status march(ovoid_context *context, const ov_body *bodies, size_t count,
-                          const ovoid_mesh_options *options, const uint64_t limit[3],
-                          const double *origin, const ov_watch *watch, bool specks,
-                          ovoid_mesh **mesh) {
+/* How a mesh is to be made, beside its options. */
+typedef struct plan_of_mesh {
+    const uint64_t *limit;
+    const double *origin; /* of a light mesh, else NULL */
+    const ov_watch *watch;
+    bool specks;
+} plan_of_mesh;
+
+static ovoid_status march_with(ovoid_context *context, marcher *m, size_t count,
+                               const plan_of_mesh *how) {
     ovoid_status status = OVOID_OK;
-    marcher m = {.bodies = bodies, .options = options, .origin = origin, .watch = watch};
-    OV_TRY(plan(context, &m, count, limit));
-    if (m.pieces.pieces > 0)
-        OV_TRY(set_up(context, &m));
-    OV_TRY(march_pieces(context, &m));
-    if (specks && m.pieces.pieces > 0)
-        OV_TRY(add_specks(context, &m, count));
-    if (m.vertices == 0)
-        OV_TRY(fail_empty(context, &m));
-    OV_TRY(mend_normals(context, &m));
-    release_work(&m); /* what is left is the mesh */
-    OV_TRY(adopt(context, &m, mesh));
+    OV_TRY(plan(context, m, count, how->limit));
+    if (m->pieces.pieces > 0)
+        OV_TRY(set_up(context, m));
+    OV_TRY(march_pieces(context, m));
+    if (how->specks && m->pieces.pieces > 0)
+        OV_TRY(add_specks(context, m, count));
+    if (m->vertices == 0)
+        OV_TRY(fail_empty(context, m));
+    OV_TRY(mend_normals(context, m));
 cleanup:
-    destroy_marcher(&m);
+    return status;
+}
+
+/* kept: a marcher for this mesh and the next, or NULL. */
+static ovoid_status march(ovoid_context *context, marcher *kept, const ov_body *bodies,
+                          size_t count, const ovoid_mesh_options *options, const plan_of_mesh *how,
+                          ovoid_mesh **mesh) {
+    marcher own = {0}, *const m = kept ? kept : &own;
+    m->bodies = bodies;
+    m->options = options;
+    m->origin = how->origin;
+    m->watch = how->watch;
+    ovoid_status status = march_with(context, m, count, how);
+    if (!kept)
+        release_work(m); /* what is left is the mesh */
+    if (status == OVOID_OK)
+        status = adopt(context, m, mesh);
+    end_mesh(m);
     return status;
 }
 
 ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
                       const ovoid_mesh_options *options, const uint64_t limit[3],
                       ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, NULL, NULL, false, mesh);
+    return march(context, NULL, bodies, count, options, &(plan_of_mesh){.limit = limit}, mesh);
 }
 
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
                             const double origin[3], const ov_watch *watch, ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, origin, watch, false, mesh);
+    return march(context, NULL, bodies, count, options,
+                 &(plan_of_mesh){.limit = limit, .origin = origin, .watch = watch}, mesh);
 }
 
 static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
@@ -850,8 +904,8 @@ static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
 ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, ovoid_mesh **mesh) {
     ovoid_mesh *made = NULL;
-    const ovoid_status status =
-        march(context, bodies, count, options, piece_limit, NULL, NULL, true, &made);
+    const ovoid_status status = march(context, NULL, bodies, count, options,
+                                      &(plan_of_mesh){.limit = piece_limit, .specks = true}, &made);
     if (status != OVOID_OK)
         return status;
     if (made->missed > 0)
@@ -865,8 +919,27 @@ ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_
     return OVOID_OK;
 }
 
-ovoid_status ov_mesh_bodies_light(ovoid_context *context, const ov_body *bodies, size_t count,
-                                  const ovoid_mesh_options *options, const double origin[3],
-                                  const ov_watch *watch, ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, piece_limit, origin, watch, true, mesh);
+ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **result) {
+    ov_marcher *const made = ov_alloc(context, 1, sizeof *made, "what meshing takes");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    *result = made;
+    return OVOID_OK;
+}
+
+void ov_marcher_destroy(ov_marcher **kept) {
+    if (!*kept)
+        return;
+    release_work(*kept);
+    free(*kept);
+    *kept = NULL;
+}
+
+ovoid_status ov_mesh_bodies_light(ovoid_context *context, ov_marcher *kept, const ov_body *bodies,
+                                  size_t count, const ovoid_mesh_options *options,
+                                  const double origin[3], const ov_watch *watch,
+                                  ovoid_mesh **mesh) {
+    const plan_of_mesh how = {
+        .limit = piece_limit, .origin = origin, .watch = watch, .specks = true};
+    return march(context, kept, bodies, count, options, &how, mesh);
 }

@@ -1,5 +1,6 @@
 #include "measure/judge.h"
 #include "model/factor.h"
+#include "neighbours/neighbours.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -133,22 +134,57 @@ static void add_spots(const ovoid_mesh *mesh, const float *distance, double leas
         }
 }
 
-/* Keeps the worst of each neighbourhood. */
-static void thin_spots(ov_spot *spots, size_t *count, double apart, size_t most) {
-    size_t kept = 0;
-    qsort(spots, *count, sizeof *spots, by_distance);
-    for (size_t n = 0; n < *count && kept < most; ++n) {
-        bool near = false;
-        for (size_t m = 0; m < kept && !near; ++m) {
-            double square = 0.0;
-            for (int k = 0; k < 3; ++k)
-                square += (spots[n].at[k] - spots[m].at[k]) * (spots[n].at[k] - spots[m].at[k]);
-            near = square < apart * apart;
+/* What rounding may add to a distance in a grid, as a share. */
+#define ROUNDING 1e-4
+
+static ovoid_status grid_of_spots(ovoid_context *context, const ov_spot *spots, size_t count,
+                                  double apart, ov_grid *grid) {
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t n = 0; n < count; ++n)
+        for (size_t k = 0; k < 3; ++k) {
+            low[k] = fmin(low[k], spots[n].at[k]);
+            high[k] = fmax(high[k], spots[n].at[k]);
         }
-        if (!near)
-            spots[kept++] = spots[n];
+    return ov_grid_create(context, low, high, (1.0 + ROUNDING) * apart, count, count, grid);
+}
+
+/* Whether one of the spots in the grid is nearer than that. */
+static bool has_near(const ov_grid *grid, const ov_spot *spots, const double at[3], double apart) {
+    uint32_t near[2 * OV_NEAR_MAX];
+    const size_t count = ov_grid_near(grid, at, UINT32_MAX, near);
+    for (size_t n = 0; n < count; ++n) {
+        double square = 0.0;
+        for (size_t k = 0; k < 3; ++k)
+            square += (at[k] - spots[near[n]].at[k]) * (at[k] - spots[near[n]].at[k]);
+        if (square < apart * apart)
+            return true;
+    }
+    return false;
+}
+
+/* Keeps the worst of each neighbourhood. */
+static ovoid_status thin_spots(ovoid_context *context, ov_spot *spots, size_t *count, double apart,
+                               size_t most) {
+    ovoid_status status = OVOID_OK;
+    ov_grid grid = {0};
+    size_t kept = 0;
+    if (*count == 0)
+        return OVOID_OK;
+    qsort(spots, *count, sizeof *spots, by_distance);
+    if (apart > 0.0)
+        OV_TRY(grid_of_spots(context, spots, *count, apart, &grid));
+    for (size_t n = 0; n < *count && kept < most; ++n) {
+        if (apart > 0.0 && has_near(&grid, spots, spots[n].at, apart))
+            continue;
+        spots[kept] = spots[n];
+        if (apart > 0.0)
+            OV_TRY(ov_grid_add(context, &grid, spots[kept].at, (uint32_t)kept));
+        ++kept;
     }
     *count = kept;
+cleanup:
+    ov_grid_destroy(&grid);
+    return status;
 }
 
 static void judge_distances(const ovoid_mesh *mesh, const float *distance,
@@ -225,8 +261,7 @@ static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least,
         return OVOID_ERROR_MEMORY;
     add_spots(judge->mesh, t->from_original, least, *spots, spot_count);
     add_spots(t->mesh, t->from_model, least, *spots, spot_count);
-    thin_spots(*spots, spot_count, apart, most);
-    return OVOID_OK;
+    return thin_spots(judge->context, *spots, spot_count, apart, most);
 }
 
 ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
@@ -240,6 +275,11 @@ ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t 
     if (judgement->valid)
         OV_TRY(collect_spots(judge, &t, least, apart, most, spots, spot_count));
 cleanup:
+    if (status != OVOID_OK) {
+        free(*spots);
+        *spots = NULL;
+        *spot_count = 0;
+    }
     trial_destroy(&t);
     return status;
 }

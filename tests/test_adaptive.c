@@ -2,7 +2,7 @@
  * The adaptive method from outside, by ovoid_fit(): its goals, odd molecules, what is independent
  * of the device, and stops. Models are measured by ovoid_measure(), which knows nothing of fits.
  */
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 #include "support.h"
 
 /* Of so large a share of the atoms the owner is among so few largest values at the centre, and so
@@ -43,7 +43,7 @@ static ovoid_molecule *random_chain(ovoid_context *context, size_t atoms, uint64
 
 static ovoid_fit_options options_of(ovoid_goal goal, double value) {
     ovoid_fit_options options;
-    ovoid_fit_options_init(&options);
+    ovoid_fit_options_init(&options, sizeof options);
     options.adaptive.goal = goal;
     if (goal == OVOID_GOAL_ELLIPSOIDS)
         options.adaptive.ellipsoids = (uint32_t)value;
@@ -69,9 +69,10 @@ typedef struct outcome {
 static void measure(ovoid_context *context, const ovoid_molecule *molecule,
                     const ovoid_fit_options *options, outcome *o) {
     ovoid_measure_options measuring;
-    ovoid_measure_options_init(&measuring);
+    ovoid_measure_options_init(&measuring, sizeof measuring);
     measuring.isovalue = options->isovalue;
     measuring.spacing = options->adaptive.mesh_spacing;
+    ovoid_measures_init(&o->measures, sizeof o->measures);
     test_check(context, ovoid_measure(context, molecule, o->model, &measuring, &o->measures));
     /* The file's nine digits apart, what the fit says is what anybody measures. */
     expect_near(o->result.distance, o->measures.deviation, 1e-4, "the distance");
@@ -81,6 +82,7 @@ static outcome fit(ovoid_context *context, const ovoid_molecule *molecule,
                    const ovoid_fit_options *options) {
     outcome o = {0};
     memset(&o.result, 0xff, sizeof o.result);
+    o.result.size = sizeof o.result;
     test_check(context, ovoid_fit(context, molecule, options, &o.model, &o.result));
     const size_t count = ovoid_model_size(o.model);
     assert_int_equal(count, o.result.ellipsoids);
@@ -200,6 +202,7 @@ static size_t needed(ovoid_context *context, const double *xyzr, size_t atoms, d
     options.spacing = 0.4; /* that of small molecules goes with the number of atoms */
     ovoid_model *model = NULL;
     ovoid_fit_result result;
+    ovoid_fit_result_init(&result, sizeof result);
     test_check(context, ovoid_fit(context, molecule, &options, &model, &result));
     assert_true(result.reached && result.distance <= tolerance);
     ovoid_model_destroy(&model);
@@ -258,7 +261,7 @@ static void tolerances_out_of_reach(void **state) {
     o = fit(*state, molecule, &options);
     print_message("unrefined: %zu of %zu, %.3g\n", (size_t)o.result.ellipsoids, atoms,
                   o.result.distance);
-    assert_int_equal(o.result.solver_iterations, 0);
+    assert_int_equal(o.result.adaptive.solver_iterations, 0);
     assert_true(!o.result.reached || o.result.ellipsoids == atoms);
     ovoid_model_destroy(&o.model);
     ovoid_molecule_destroy(&molecule);
@@ -565,6 +568,7 @@ static void a_stopped_fit_hands_over_nothing(void **state) {
         ovoid_fit_result result, untouched;
         ovoid_model *const nothing = (ovoid_model *)&s, *model = nothing;
         memset(&untouched, 0x5a, sizeof untouched);
+        untouched.size = sizeof untouched;
         result = untouched;
         options.adaptive.effort = 2;
         ovoid_context_on_progress(*state, stop_there, &s);
@@ -589,6 +593,7 @@ static void expect_refusal(ovoid_context *context, const ovoid_molecule *molecul
     ovoid_model *model = NULL;
     ovoid_fit_result result, untouched;
     memset(&untouched, 0x5a, sizeof untouched);
+    untouched.size = sizeof untouched;
     result = untouched;
     test_refused(context, ovoid_fit(context, molecule, options, &model, &result), status, text);
     assert_null(model);

@@ -1,4 +1,5 @@
 #include "base/progress.h"
+#include "base/sized.h"
 #include "fit/adaptive/adaptive.h"
 #include "fit/l1/l1.h"
 #include "fit/options.h"
@@ -51,7 +52,7 @@ static ovoid_status fit_l1(ovoid_context *context, const ovoid_molecule *molecul
     result->sample_seconds = ov_seconds() - began;
     result->spacing = options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1;
     result->reached = true;
-    result->distance = NAN;
+    result->verdict = OVOID_VERDICT_NO_GOAL;
     OV_TRY(ov_l1_fit(context, ovoid_molecule_xyzr(molecule), ovoid_molecule_atoms(molecule),
                      &samples, options, ellipsoids, owner, result));
 cleanup:
@@ -66,31 +67,37 @@ ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
     ovoid_ellipsoid *ellipsoids = NULL;
     uint32_t *owner = NULL;
     ovoid_model *made = NULL;
-    ovoid_fit_result done = {0};
+    ovoid_fit_options o;
+    ovoid_fit_result done;
     ov_device *device;
     OV_NEED(context, context);
     OV_NEED(context, molecule);
     OV_NEED(context, options);
     OV_NEED(context, model);
+    ovoid_fit_options_init(&o, sizeof o);
+    ovoid_fit_result_init(&done, sizeof done);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const double began = ov_seconds();
     ov_progress_begin(context, "sample");
     context->now.ellipsoids = atoms;
-    OV_TRY(ov_fit_options_check(context, options));
-    OV_TRY(ov_atoms_check(context, xyzr, atoms, options->decay));
+    OV_TRY(OV_SIZED_TAKE(context, ovoid_fit_options, options, &o));
+    OV_TRY(ov_sized_check(context, "ovoid_fit_result", result));
+    OV_TRY(ov_fit_options_check(context, &o));
+    ov_progress_fit(context, o.method);
+    done.method = o.method;
+    OV_TRY(ov_atoms_check(context, xyzr, atoms, o.decay));
     OV_TRY(ov_device_get(context, &device));
-    if (options->method == OVOID_METHOD_L1)
-        OV_TRY(fit_l1(context, molecule, options, began, &ellipsoids, &owner, &done));
+    if (o.method == OVOID_METHOD_L1)
+        OV_TRY(fit_l1(context, molecule, &o, began, &ellipsoids, &owner, &done));
     else
-        OV_TRY(ov_adaptive_fit(context, xyzr, atoms, options, began, &ellipsoids, &owner, &done));
-    OV_TRY(ovoid_model_create(context, ellipsoids, (size_t)done.ellipsoids, options->decay,
-                              options->isovalue, &made));
+        OV_TRY(ov_adaptive_fit(context, xyzr, atoms, &o, began, &ellipsoids, &owner, &done));
+    OV_TRY(ovoid_model_create(context, ellipsoids, (size_t)done.ellipsoids, o.decay, o.isovalue,
+                              &made));
     ov_model_take_owner(made, &owner, atoms);
     *model = made;
     done.fit_seconds = ov_seconds() - began - done.sample_seconds;
-    if (result)
-        *result = done;
+    ov_sized_give(result, &done, sizeof done);
 cleanup:
     free(ellipsoids);
     free(owner);

@@ -66,7 +66,7 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
                              double isovalue, double spacing, ov_watch watch, ov_judge *judge) {
     ovoid_status status = OVOID_OK;
     ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay), .watch = watch};
-    ovoid_mesh_options_init(&made.meshing);
+    ovoid_mesh_options_init(&made.meshing, sizeof made.meshing);
     made.meshing.isovalue = isovalue;
     made.meshing.spacing = spacing;
     middle_of(xyzr, atoms, made.origin);

@@ -186,7 +186,8 @@ static ovoid_status finish(ov_adaptive *f, ov_trial *best, ovoid_ellipsoid **ell
     result->points = f->samples.points.count;
     result->ellipsoids = best->count;
     result->iterations = f->steps;
-    result->solver_iterations = f->refiner.solver.iterations + f->local.refiner.solver.iterations;
+    result->adaptive.solver_iterations =
+        f->refiner.solver.iterations + f->local.refiner.solver.iterations;
     result->distance = judgement.valid && !is_coarse(f) ? judgement.deviation : NAN;
     result->verdict = verdict_of(f, best->count, &judgement);
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
@@ -213,6 +214,7 @@ ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t 
                              ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
+    uint64_t before[OVOID_COUNTS];
     ov_trial best = {0};
     ov_adaptive f = {.context = context,
                      .xyzr = xyzr,
@@ -225,7 +227,7 @@ ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t 
                        "%llu ellipsoids are asked for, and there are only %zu atoms to begin with",
                        (unsigned long long)options->adaptive.ellipsoids, atoms);
     OV_TRY(ov_device_get(context, &device));
-    const uint64_t launches = device->launches;
+    ov_device_counted(device, NULL, before);
     OV_TRY(prepare(&f));
     OV_TRY(ov_trial_create(&f, &best));
     result->sample_seconds = ov_seconds() - began;
@@ -233,7 +235,7 @@ ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t 
     OV_TRY(finish(&f, &best, ellipsoids, result));
     *owner = best.owner;
     best.owner = NULL;
-    result->profile.launches = device->launches - launches;
+    ov_device_counted(device, before, result->counts);
 cleanup:
     ov_trial_destroy(&best);
     destroy(&f);

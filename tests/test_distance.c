@@ -368,6 +368,7 @@ static void test_near_chunks(void **state) {
     ovoid_mesh *mesh = shape_mesh(context, &s);
     ov_trail trail = {0};
     ov_facets facets = {0};
+    ov_meter meter = {0};
     float *const xyz = test_alloc(3 * count, sizeof *xyz);
     float *const squared = test_alloc(count, sizeof *squared);
     for (size_t k = 0; k < count; ++k) /* from 1 to 6 angstrom outside, in order */
@@ -377,13 +378,13 @@ static void test_near_chunks(void **state) {
             xyz[3 * k + j] = (float)(way * (axes[j] + random_uniform(&random, 1.0, 6.0)));
         }
     test_check(context, ov_trail_create(context, mesh, false, &trail));
-    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    test_check(context, ov_facets_set(context, &facets, &trail, origin));
     facets.chunk = OV_GROUP;
     for (size_t batch = 1; batch <= 4; batch += 3) {
         const ov_sites sites = {.count = count, .xyz = xyz};
         size_t off = 0;
-        facets.batch = batch;
-        test_check(context, ov_facets_distances(context, &facets, &sites, squared));
+        meter.batch = batch;
+        test_check(context, ov_facets_distances(context, &meter, &facets, &sites, squared));
         for (size_t k = 0; k < count; ++k) {
             const double point[3] = {xyz[3 * k], xyz[3 * k + 1], xyz[3 * k + 2]};
             const double wanted = reference_mesh_distance(point, mesh, false);
@@ -396,6 +397,7 @@ static void test_near_chunks(void **state) {
     free(xyz);
     free(squared);
     ov_facets_destroy(&facets);
+    ov_meter_destroy(&meter);
     ov_trail_destroy(&trail);
     ovoid_mesh_destroy(&mesh);
     shape_destroy(&s);

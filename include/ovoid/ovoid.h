@@ -9,8 +9,9 @@
  * Conventions of every function here:
  * - Lengths are in angstrom, areas in angstrom^2, decay rates in angstrom^-2, angles in radian,
  *   times in second. Coordinates are those of the input file.
- * - A function that can fail returns an ovoid_status. On failure its outputs are untouched and
- *   ovoid_context_error() describes what happened, with file, line, OpenCL call or device.
+ * - A function that can fail returns an ovoid_status. On failure its outputs are untouched (but for
+ *   fits that are stopped: see ovoid_fit()) and ovoid_context_error() describes what happened, with
+ * file, line, OpenCL call or device.
  * - xxx_destroy(xxx **) frees, sets the pointer to NULL, and accepts NULL and repeats. Whatever a
  *   function hands out as a pointer to const belongs to the object it came from.
  * - NULL, where it has no meaning of its own: a function that returns a status returns
@@ -104,7 +105,8 @@ typedef struct ovoid_progress {
 } ovoid_progress;
 
 /* Returns true to go on, false to stop: the function that was called then frees what it has made,
- * leaves its outputs untouched and no file behind, and returns OVOID_ERROR_CANCELLED. */
+ * leaves its outputs untouched and no file behind, and returns OVOID_ERROR_CANCELLED; a fit hands
+ * over the best model that held (see ovoid_fit()). */
 typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
 
 /* Calls fn from now on while a function with this context is at work that may take long: reading,
@@ -652,7 +654,10 @@ typedef struct ovoid_fit_result {
 OVOID_API void ovoid_fit_options_init(ovoid_fit_options *options);
 
 /* Fits a model to a molecule's surface on the opened device (opening the default one if none is).
- * The same input, options, device and driver give the same bits. result may be NULL. */
+ * The same input, options, device and driver give the same bits. result may be NULL. A fit that the
+ * progress callback stops (OVOID_ERROR_CANCELLED) hands over the best model that held by then, or
+ * sets *model to NULL, as ovoid_fitter_reach() does (fitter.h). For more than one fit of a molecule
+ * make an ovoid_fitter. */
 OVOID_API ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
                                  const ovoid_fit_options *options, ovoid_model **model,
                                  ovoid_fit_result *result);
@@ -660,5 +665,7 @@ OVOID_API ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *m
 #ifdef __cplusplus
 }
 #endif
+
+#include "ovoid/fitter.h"
 
 #endif

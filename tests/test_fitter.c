@@ -614,7 +614,7 @@ static void errors_leave_it_usable(void **state) {
         other_starts(*state, molecule, fitter);
         xyz[7] = NAN;
         test_refused(*state, ovoid_fitter_move(*state, fitter, xyz), OVOID_ERROR_ARGUMENT,
-                     "atom 3");
+                     "y of atom 2 (from 0) is nan");
         test_check(*state, ovoid_context_create(&other));
         test_refused(other, ovoid_fitter_reach(other, fitter, &options, &model, NULL),
                      OVOID_ERROR_ARGUMENT, "another context");

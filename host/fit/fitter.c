@@ -8,6 +8,7 @@
 #include "model/factor.h"
 #include "model/model.h"
 #include "model/owner.h"
+#include "molecule/molecule.h"
 #include "neighbours/neighbours.h"
 
 #include <math.h>
@@ -331,15 +332,25 @@ cleanup:
     return status;
 }
 
+static ovoid_status check_coordinates(const ovoid_fitter *fitter, const double *xyz) {
+    for (size_t n = 0; n < 3 * fitter->atoms; ++n)
+        if (!(fabs(xyz[n]) <= OV_COORDINATE_LIMIT))
+            return ov_fail(
+                fitter->context, OVOID_ERROR_ARGUMENT,
+                "ovoid_fitter_move: %c of atom %zu (from 0) is %g: not within %g angstrom",
+                "xyz"[n % 3], n / 3, xyz[n], OV_COORDINATE_LIMIT);
+    return OVOID_OK;
+}
+
 ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, const double *xyz) {
     ovoid_status status = OVOID_OK;
     ov_found found = {0};
     double *after = NULL;
-    ovoid_molecule *checked = NULL;
     OV_NEED(context, context);
     OV_NEED(context, fitter);
     OV_NEED(context, xyz);
     OV_TRY(check_context(context, fitter));
+    OV_TRY(check_coordinates(fitter, xyz));
     after = ov_alloc(context, 4 * fitter->atoms, sizeof *after, "atoms");
     if (!after)
         return OVOID_ERROR_MEMORY;
@@ -347,7 +358,6 @@ ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, con
         memcpy(after + 4 * i, xyz + 3 * i, 3 * sizeof *xyz);
         after[4 * i + 3] = fitter->xyzr[4 * i + 3];
     }
-    OV_TRY(ovoid_molecule_create(context, after, fitter->atoms, &checked)); /* or refuses them */
     OV_TRY(move_model(fitter, after, &found));
     memcpy(fitter->xyzr, after, 4 * fitter->atoms * sizeof *after);
     take_start(fitter, &found);
@@ -355,7 +365,6 @@ ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, con
         ov_adaptive_forget(fitter->adaptive);
     ov_l1_band_destroy(&fitter->band);
 cleanup:
-    ovoid_molecule_destroy(&checked);
     ov_found_destroy(&found);
     free(after);
     return status;

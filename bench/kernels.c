@@ -374,7 +374,7 @@ static bool is_model(const char *path) {
 
 int main(int argc, char **argv) {
     ovoid_fit_options defaults;
-    ovoid_fit_options_init(&defaults);
+    ovoid_fit_options_init(&defaults, sizeof defaults);
     bench b = {.spacing = OVOID_DEFAULT_SPACING_L1,
                .padding = defaults.padding,
                .decay = defaults.decay,

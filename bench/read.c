@@ -36,7 +36,7 @@ static void choose_radii(ovoid_read_options *options, const char *name) {
 }
 
 static void print(const ovoid_molecule *molecule, double seconds, long before) {
-    const ovoid_molecule_counts c = ovoid_molecule_read_counts(molecule);
+    const ovoid_molecule_counts c = *ovoid_molecule_read_counts(molecule);
     size_t residues;
     ovoid_molecule_residues(molecule, &residues);
     printf("{\"atoms\": %llu, \"residues\": %zu, \"skipped\": %llu, \"models\": %llu, "

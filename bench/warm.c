@@ -26,7 +26,7 @@ int main(int argc, char **argv) {
         fputs("usage: warm MOLECULE ELLIPSOIDS [RUNS]\n", stderr);
         return 2;
     }
-    ovoid_fit_options_init(&options);
+    ovoid_fit_options_init(&options, sizeof options);
     options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
     options.adaptive.ellipsoids = (uint32_t)strtoul(argv[2], NULL, 10);
     if (ovoid_context_create(&context) != OVOID_OK ||
@@ -35,6 +35,7 @@ int main(int argc, char **argv) {
     for (int run = 0; run <= runs; ++run) {
         ovoid_model *model = NULL;
         ovoid_fit_result result;
+        ovoid_fit_result_init(&result, sizeof result);
         if (ovoid_fit(context, molecule, &options, &model, &result) != OVOID_OK)
             return fail(context);
         if (run > 0)

@@ -5,7 +5,6 @@ function(ovoid_room name)
   target_include_directories(ov_${name} PRIVATE ${PROJECT_SOURCE_DIR}/include
     ${PROJECT_SOURCE_DIR}/host ${PROJECT_SOURCE_DIR}/kernels)
   target_link_libraries(ov_${name} PRIVATE ovoid_flags ${ROOM_LINK})
-  target_compile_definitions(ov_${name} PRIVATE OVOID_VERSION="${PROJECT_VERSION}")
   set_target_properties(ov_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   set_property(GLOBAL APPEND PROPERTY OVOID_ROOMS ov_${name})
 endfunction()

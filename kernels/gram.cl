@@ -19,10 +19,12 @@
 
 #if OV_LANES == 1
 #define OV_SHARERS 1 /* work-items per term */
+#define OV_TEAM_KERNEL __kernel
 #define OV_TILE_PACKS (64 / OV_VECTORS)
 #define OV_FLUSH_TILES 4
 #else
 #define OV_SHARERS OV_TEAM
+#define OV_TEAM_KERNEL __kernel __attribute__((reqd_work_group_size(OV_TEAM, 1, 1)))
 #define OV_TILE_PACKS OV_PACKS_AT_ONCE
 #define OV_FLUSH_TILES 32
 #endif
@@ -135,10 +137,11 @@ static inline float ov_sum(ov_vec value) {
 #endif
 }
 
-__kernel void gram(const uint count, __global const float *restrict points,
-                   __global const float4 *restrict origins, __global const float *restrict weight,
-                   __global const uint *restrict start, __global const uint *restrict item,
-                   __global const ov_term *restrict terms, __global float *restrict result) {
+OV_TEAM_KERNEL void gram(const uint count, __global const float *restrict points,
+                         __global const float4 *restrict origins,
+                         __global const float *restrict weight, __global const uint *restrict start,
+                         __global const uint *restrict item, __global const ov_term *restrict terms,
+                         __global float *restrict result) {
     const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
     const uint lane = sharer % OV_LANES;
 #if OV_SHARERS == 1
@@ -198,10 +201,14 @@ __kernel void gram(const uint count, __global const float *restrict points,
     barrier(CLK_LOCAL_MEM_FENCE);
     for (uint m = sharer; m < OV_GRAM; m += OV_SHARERS) {
         __local const float *const parts = scratch + m * (OV_SHARERS + 1);
+#if OV_SHARERS >= 4
         float4 four = 0.0f; /* shorter chains, so fewer roundings */
         for (uint s = 0; s < OV_SHARERS; s += 4)
             four += vload4(0, parts + s);
         out[m] = (four.x + four.y) + (four.z + four.w);
+#else
+        out[m] = parts[0] + parts[1];
+#endif
     }
 #endif
 }

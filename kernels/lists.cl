@@ -153,8 +153,9 @@ static inline uint ov_bin(uint group, uint term, uint block) {
  * one after, and chain[term].y the number of entries. Chunks from `room` on are counted, not
  * written.
  *
- * tally, zero at the start: chunks taken, entries of every bin, pairs of every group, pairs of
- * every term. block: terms that share a bin. */
+ * tally: chunks taken, pairs of every term, entries of every bin, pairs of every group, all zero at
+ * the start but those of terms. block: terms that share a bin. groups: of packs, 0 where nobody
+ * wants their lists, and bins and groups are not counted. */
 __kernel void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
                              const ov_tree tree, __global const float *restrict boxes,
                              const float skin, const uint groups, const uint block, const uint room,
@@ -170,7 +171,8 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
-    __global uint *const bins = tally + 1, *const pairs = bins + (size_t)groups * OV_BINS;
+    __global uint *const bins = tally + 1 + terms_count;
+    __global uint *const pairs = bins + (size_t)groups * OV_BINS;
     const ov_term t = terms[index];
     uint found = 0, entries = 0, first = 0, chunk = 0;
     if (t.reach >= 0.0f && levels > 0) {
@@ -213,6 +215,8 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
                         const uint packs = popcount(own);
                         found += packs;
                         ++entries;
+                        if (groups == 0)
+                            continue;
                         atomic_inc(&bins[ov_bin(group, index, block)]);
                         atomic_add(&pairs[group], packs);
                     }
@@ -238,7 +242,7 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
             fresh = true;
         }
     }
-    pairs[groups + index] = found;
+    tally[1 + index] = found;
     chain[index] = (uint2)(first, entries);
 }
 

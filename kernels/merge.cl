@@ -7,8 +7,15 @@
  * points, origins: as for field().
  * start, item: the packs of term i are item[start[i]] .. item[start[i + 1] - 1], ascending, so that
  * one walk along both lists meets each pack once.
- * On CPUs one work-item per pair, elsewhere a group of OV_LANES.
+ * On CPUs one work-item per pair, elsewhere OV_LANES of them; a work-group of OV_TEAM has several
+ * pairs then, so that it fills a warp.
  */
+
+#if OV_LANES == 1
+#define MERGE_KERNEL __kernel
+#else
+#define MERGE_KERNEL __kernel __attribute__((reqd_work_group_size(OV_TEAM, 1, 1)))
+#endif
 
 static inline ov_vec squared_residual(ov_vec v, ov_vec low, ov_vec high) {
     const ov_vec r = v - clamp(v, low, high);
@@ -31,19 +38,21 @@ static inline float sum_of(ov_vec value) {
 #endif
 }
 
-__kernel void merge_loss(const uint count, __global const uint *restrict pairs,
-                         __global const ov_term *restrict merged,
-                         __global const float *restrict points,
-                         __global const float4 *restrict origins,
-                         __global const float *restrict value, __global const float *restrict low,
-                         __global const float *restrict high, __global const float *restrict weight,
-                         __global const uint *restrict start, __global const uint *restrict item,
-                         __global const ov_term *restrict terms, __global float *restrict loss) {
-    const uint pair = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
+MERGE_KERNEL void
+merge_loss(const uint count, __global const uint *restrict pairs,
+           __global const ov_term *restrict merged, __global const float *restrict points,
+           __global const float4 *restrict origins, __global const float *restrict value,
+           __global const float *restrict low, __global const float *restrict high,
+           __global const float *restrict weight, __global const uint *restrict start,
+           __global const uint *restrict item, __global const ov_term *restrict terms,
+           __global float *restrict loss) {
+    const uint own_pair = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
 #if OV_LANES == 1
-    if (pair >= count)
+    if (own_pair >= count)
         return;
 #endif
+    /* Work-items beyond the last pair repeat it, since the whole group meets at the barrier. */
+    const uint pair = min(own_pair, count - 1);
     const uint i = pairs[2 * pair], j = pairs[2 * pair + 1];
     const ov_term ti = terms[i], tj = terms[j], tm = merged[pair];
     uint at_i = start[i], at_j = start[j];
@@ -75,13 +84,14 @@ __kernel void merge_loss(const uint count, __global const uint *restrict pairs,
 #if OV_LANES == 1
     loss[pair] = own;
 #else
-    __local float scratch[OV_LANES];
-    scratch[lane] = own;
+    __local float scratch[OV_TEAM];
+    const uint at = get_local_id(0);
+    scratch[at] = own;
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (lane == 0) {
+    if (lane == 0 && own_pair < count) {
         float total = 0.0f;
         for (uint k = 0; k < OV_LANES; ++k)
-            total += scratch[k];
+            total += scratch[at + k];
         loss[pair] = total;
     }
 #endif

@@ -15,9 +15,11 @@
 
 #if OV_LANES == 1
 #define OV_SHARERS 1 /* work-items per term */
+#define OV_TEAM_KERNEL __kernel
 #define OV_TILE_PACKS 32
 #else
 #define OV_SHARERS OV_TEAM
+#define OV_TEAM_KERNEL __kernel __attribute__((reqd_work_group_size(OV_TEAM, 1, 1)))
 #define OV_TILE_PACKS OV_PACKS_AT_ONCE
 #endif
 #define OV_PACKS_AT_ONCE (OV_SHARERS / OV_LANES)
@@ -91,10 +93,12 @@ static inline void ov_add_team(float *high, float *low, uint lane, __local float
 }
 #endif
 
-__kernel void moments(const uint count, __global const float *restrict points,
-                      __global const float4 *restrict origins, __global const float *restrict u,
-                      __global const uint *restrict start, __global const uint *restrict item,
-                      __global const ov_term *restrict terms, __global float *restrict result) {
+OV_TEAM_KERNEL void moments(const uint count, __global const float *restrict points,
+                            __global const float4 *restrict origins,
+                            __global const float *restrict u, __global const uint *restrict start,
+                            __global const uint *restrict item,
+                            __global const ov_term *restrict terms,
+                            __global float *restrict result) {
     const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
     const uint lane = sharer % OV_LANES;
 #if OV_SHARERS == 1

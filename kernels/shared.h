@@ -19,8 +19,6 @@ typedef float ov_f32;
 /* Points in a pack: one float16 on a CPU, half a warp on a GPU. Measured on long lists and on real
  * molecules, 16 beats 32 in rate and in the share of useful pairs (bench/results). */
 #define OV_PACK 16
-/* Work-items that share a term where packs have several lanes: one warp. */
-#define OV_TEAM 32
 /* Lattice points in bricks are packs: x runs fastest. */
 #define OV_BRICK_X 4
 #define OV_BRICK_Y 2
@@ -40,8 +38,18 @@ typedef float ov_f32;
  * xxyz, xxzz, xyyy, xyyz, xyzz, xzzz, yyyy, yyyz, yyzz, yzzz, zzzz. */
 #define OV_GRAM 35
 
-/* Ellipsoids in a work-group of the solver (kernels/solve.cl). */
-#define OV_SOLVE_GROUP 32
+/* Packs that share a sum of the misfit (kernels/misfit.cl). */
+#define OV_MISFIT_PACKS 64
+
+/* The most ellipsoids whose iterations take one work-group each, and its size at most
+ * (kernels/solve.cl). */
+#define OV_SOLVE_ALONE 1024
+#define OV_SOLVE_WIDE 256
+
+/* Floats of an ellipsoid in the solver (kernels/solve.cl): its factor L, and the lower triangle of
+ * its 10 x 10 block by rows. */
+#define OV_SOLVE_FACTOR 6
+#define OV_SOLVE_BLOCK 55
 
 /* Triangles in a leaf of the tree over a mesh, and floats of each (kernels/distance.cl). */
 #define OV_LEAF 16

@@ -8,13 +8,15 @@
  * z: "to_polynomial" maps a direction of the parameters to its ten coefficients, "to_parameters" is
  * the transpose, from moments to parameters. (model/factor.h has them in double.)
  *
- * One work-item per ellipsoid in groups of OV_SOLVE_GROUP. Dot products: each group leaves one
- * partial sum, the next kernel's groups add them up, all in one order.
+ * One work-item per ellipsoid in groups of OV_SOLVE_GROUP, which the build sets. Dot products: each
+ * group leaves one partial sum, the next kernel's groups add them up, all in one order. Where
+ * ellipsoids are few, one group does all of an iteration but the product with J^T W J.
  */
 
 #define PARAMETERS 10
-#define BLOCK 55 /* lower triangle of a 10 x 10 block, by rows */
-#define FACTOR 6
+#define BLOCK OV_SOLVE_BLOCK
+#define FACTOR OV_SOLVE_FACTOR
+#define SOLVE_KERNEL __kernel __attribute__((reqd_work_group_size(OV_SOLVE_GROUP, 1, 1)))
 
 static inline void to_polynomial(const float *l, const float *v, float *c) {
     const float s1 = fma(l[0], v[1], fma(l[1], v[2], l[2] * v[3]));
@@ -153,13 +155,12 @@ static inline float take_sum(__global const float *partial, uint groups) {
 /* The blocks C^T G C + lambda diag(C^T G C), factored; the diagonal D, 1 where a parameter does not
  * matter, so that it stays still even without damping; and the start of the iteration: x = 0, r =
  * -C^T moments, z = block^-1 r, p = z. */
-__kernel void solve_start(const uint count, const float lambda,
-                          __global const float *restrict factor,
-                          __global const float *restrict gram,
-                          __global const float *restrict moments, __global float *restrict block,
-                          __global float *restrict diagonal, __global float *restrict x,
-                          __global float *restrict r, __global float *restrict p,
-                          __global float *restrict polynomial, __global float *restrict rz) {
+SOLVE_KERNEL void
+solve_start(const uint count, const float lambda, __global const float *restrict factor,
+            __global const float *restrict gram, __global const float *restrict moments,
+            __global float *restrict block, __global float *restrict diagonal,
+            __global float *restrict x, __global float *restrict r, __global float *restrict p,
+            __global float *restrict polynomial, __global float *restrict rz) {
     __local float scratch[OV_SOLVE_GROUP];
     const uint index = get_global_id(0);
     float sum = 0.0f;
@@ -210,82 +211,49 @@ __kernel void solve_start(const uint count, const float lambda,
     leave_sum(sum, scratch, rz);
 }
 
-/* q = C^T moments + lambda D p, and the partial sums of p . q. */
-__kernel void solve_product(const uint count, const float lambda,
-                            __global const float *restrict factor,
-                            __global const float *restrict moments,
-                            __global const float *restrict diagonal,
-                            __global const float *restrict p, __global float *restrict q,
-                            __global float *restrict pq) {
-    __local float scratch[OV_SOLVE_GROUP];
-    const uint index = get_global_id(0);
-    float sum = 0.0f;
-    if (index < count) {
-        float l[FACTOR], m[OV_MONOMIALS], g[PARAMETERS], own[PARAMETERS], d[PARAMETERS];
-        load_factor(factor, index, l);
-        load_moments(moments, index, m);
-        load_ten(p, index, own);
-        load_ten(diagonal, index, d);
-        to_parameters(l, m, g);
-        for (uint k = 0; k < PARAMETERS; ++k)
-            g[k] = fma(lambda * d[k], own[k], g[k]);
-        store_ten(g, index, q);
-        sum = dot_ten(own, g);
-    }
-    leave_sum(sum, scratch, pq);
+/* ---- an iteration, ellipsoid by ellipsoid -------------------------------------------------- */
+
+/* q = C^T moments + lambda D p; returns p . q. */
+static inline float multiply_one(uint index, float lambda, __global const float *restrict factor,
+                                 __global const float *restrict moments,
+                                 __global const float *restrict diagonal, __global const float *p,
+                                 __global float *q) {
+    float l[FACTOR], m[OV_MONOMIALS], g[PARAMETERS], own[PARAMETERS], d[PARAMETERS];
+    load_factor(factor, index, l);
+    load_moments(moments, index, m);
+    load_ten(p, index, own);
+    load_ten(diagonal, index, d);
+    to_parameters(l, m, g);
+    for (uint k = 0; k < PARAMETERS; ++k)
+        g[k] = fma(lambda * d[k], own[k], g[k]);
+    store_ten(g, index, q);
+    return dot_ten(own, g);
 }
 
-/* alpha = rz / pq; x += alpha p, r -= alpha q, z = block^-1 r, and the partial sums of r . z. */
-__kernel void solve_update(const uint count, const uint groups,
-                           __global const float *restrict block, __global const float *restrict rz,
-                           __global const float *restrict pq, __global const float *restrict p,
-                           __global const float *restrict q, __global float *restrict x,
-                           __global float *restrict r, __global float *restrict z,
-                           __global float *restrict rz_next) {
-    __local float scratch[OV_SOLVE_GROUP];
-    __local float alpha;
-    const uint index = get_global_id(0);
-    if (get_local_id(0) == 0) {
-        const float curvature = take_sum(pq, groups);
-        alpha = curvature > 0.0f ? take_sum(rz, groups) / curvature : 0.0f;
-    }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    float sum = 0.0f;
-    if (index < count) {
-        float own[PARAMETERS], change[PARAMETERS];
-        load_ten(x, index, own);
-        load_ten(p, index, change);
-        for (uint k = 0; k < PARAMETERS; ++k)
-            own[k] = fma(alpha, change[k], own[k]);
-        store_ten(own, index, x);
-        load_ten(r, index, own);
-        load_ten(q, index, change);
-        for (uint k = 0; k < PARAMETERS; ++k)
-            change[k] = own[k] = fma(-alpha, change[k], own[k]);
-        store_ten(own, index, r);
-        solve_block(block + (size_t)index * BLOCK, change);
-        store_ten(change, index, z);
-        sum = dot_ten(own, change);
-    }
-    leave_sum(sum, scratch, rz_next);
+/* x += alpha p, r -= alpha q, z = block^-1 r; returns r . z. */
+static inline float advance_one(uint index, float alpha, __global const float *restrict block,
+                                __global const float *p, __global const float *q, __global float *x,
+                                __global float *r, __global float *z) {
+    float own[PARAMETERS], change[PARAMETERS];
+    load_ten(x, index, own);
+    load_ten(p, index, change);
+    for (uint k = 0; k < PARAMETERS; ++k)
+        own[k] = fma(alpha, change[k], own[k]);
+    store_ten(own, index, x);
+    load_ten(r, index, own);
+    load_ten(q, index, change);
+    for (uint k = 0; k < PARAMETERS; ++k)
+        change[k] = own[k] = fma(-alpha, change[k], own[k]);
+    store_ten(own, index, r);
+    solve_block(block + (size_t)index * BLOCK, change);
+    store_ten(change, index, z);
+    return dot_ten(own, change);
 }
 
-/* beta = rz_next / rz; p = z + beta p and its polynomials. */
-__kernel void solve_direction(const uint count, const uint groups,
-                              __global const float *restrict factor,
-                              __global const float *restrict rz,
-                              __global const float *restrict rz_next,
-                              __global const float *restrict z, __global float *restrict p,
-                              __global float *restrict polynomial) {
-    __local float beta;
-    const uint index = get_global_id(0);
-    if (get_local_id(0) == 0) {
-        const float before = take_sum(rz, groups);
-        beta = before > 0.0f ? take_sum(rz_next, groups) / before : 0.0f;
-    }
-    barrier(CLK_LOCAL_MEM_FENCE);
-    if (index >= count)
-        return;
+/* p = z + beta p and its polynomial. */
+static inline void turn_one(uint index, float beta, __global const float *restrict factor,
+                            __global const float *z, __global float *p,
+                            __global float *restrict polynomial) {
     float l[FACTOR], own[PARAMETERS], next[PARAMETERS], c[OV_MONOMIALS];
     load_factor(factor, index, l);
     load_ten(p, index, own);
@@ -295,4 +263,117 @@ __kernel void solve_direction(const uint count, const uint groups,
     store_ten(next, index, p);
     to_polynomial(l, next, c);
     store_ten(c, index, polynomial);
+}
+
+/* ---- many ellipsoids ------------------------------------------------------------------------ */
+
+/* q = C^T moments + lambda D p, and the partial sums of p . q. */
+SOLVE_KERNEL void solve_product(const uint count, const float lambda,
+                                __global const float *restrict factor,
+                                __global const float *restrict moments,
+                                __global const float *restrict diagonal,
+                                __global const float *restrict p, __global float *restrict q,
+                                __global float *restrict pq) {
+    __local float scratch[OV_SOLVE_GROUP];
+    const uint index = get_global_id(0);
+    const float sum =
+        index < count ? multiply_one(index, lambda, factor, moments, diagonal, p, q) : 0.0f;
+    leave_sum(sum, scratch, pq);
+}
+
+/* alpha = rz / pq; x += alpha p, r -= alpha q, z = block^-1 r, and the partial sums of r . z. */
+SOLVE_KERNEL void solve_update(const uint count, const uint groups,
+                               __global const float *restrict block,
+                               __global const float *restrict rz, __global const float *restrict pq,
+                               __global const float *restrict p, __global const float *restrict q,
+                               __global float *restrict x, __global float *restrict r,
+                               __global float *restrict z, __global float *restrict rz_next) {
+    __local float scratch[OV_SOLVE_GROUP];
+    __local float alpha;
+    const uint index = get_global_id(0);
+    if (get_local_id(0) == 0) {
+        const float curvature = take_sum(pq, groups);
+        alpha = curvature > 0.0f ? take_sum(rz, groups) / curvature : 0.0f;
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    const float sum = index < count ? advance_one(index, alpha, block, p, q, x, r, z) : 0.0f;
+    leave_sum(sum, scratch, rz_next);
+}
+
+/* beta = rz_next / rz; p = z + beta p and its polynomials. */
+SOLVE_KERNEL void solve_direction(const uint count, const uint groups,
+                                  __global const float *restrict factor,
+                                  __global const float *restrict rz,
+                                  __global const float *restrict rz_next,
+                                  __global const float *restrict z, __global float *restrict p,
+                                  __global float *restrict polynomial) {
+    __local float beta;
+    const uint index = get_global_id(0);
+    if (get_local_id(0) == 0) {
+        const float before = take_sum(rz, groups);
+        beta = before > 0.0f ? take_sum(rz_next, groups) / before : 0.0f;
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (index < count)
+        turn_one(index, beta, factor, z, p, polynomial);
+}
+
+/* ---- few ellipsoids -------------------------------------------------------------------------- */
+
+/* The sum over a work-group, the same in every work-item of it, in an order that goes with its size
+ * alone. */
+static inline float sum_of_group(float own, __local float *scratch) {
+    const uint at = get_local_id(0), size = get_local_size(0);
+    scratch[at] = own;
+    barrier(CLK_LOCAL_MEM_FENCE);
+#if OV_LANES == 1
+    if (at == 0)
+        for (uint k = 1; k < size; ++k)
+            scratch[0] += scratch[k];
+    barrier(CLK_LOCAL_MEM_FENCE);
+#else
+    for (uint left = size; left > 1;) {
+        const uint half_of = (left + 1) / 2;
+        if (at + half_of < left)
+            scratch[at] += scratch[at + half_of];
+        left = half_of;
+        barrier(CLK_LOCAL_MEM_FENCE);
+    }
+#endif
+    const float sum = scratch[0];
+    barrier(CLK_LOCAL_MEM_FENCE);
+    return sum;
+}
+
+/* The three above in one, by one work-group: for up to OV_SOLVE_ALONE ellipsoids, for which a
+ * launch takes longer than what it does. Each work-item has its own ellipsoids from beginning to
+ * end. rz: the partial sums of `groups` groups; rz_next: one sum. */
+__kernel void solve_step(const uint count, const float lambda, const uint groups,
+                         __global const float *restrict factor,
+                         __global const float *restrict moments,
+                         __global const float *restrict diagonal,
+                         __global const float *restrict block, __global const float *restrict rz,
+                         __global float *restrict p, __global float *restrict q,
+                         __global float *restrict x, __global float *restrict r,
+                         __global float *restrict z, __global float *restrict polynomial,
+                         __global float *restrict rz_next) {
+    __local float scratch[OV_SOLVE_WIDE];
+    const uint at = get_local_id(0), size = get_local_size(0);
+    const float before = take_sum(rz, groups);
+    float sum = 0.0f;
+    if (get_group_id(0) > 0)
+        return;
+    for (uint index = at; index < count; index += size)
+        sum += multiply_one(index, lambda, factor, moments, diagonal, p, q);
+    const float curvature = sum_of_group(sum, scratch);
+    const float alpha = curvature > 0.0f ? before / curvature : 0.0f;
+    sum = 0.0f;
+    for (uint index = at; index < count; index += size)
+        sum += advance_one(index, alpha, block, p, q, x, r, z);
+    const float after = sum_of_group(sum, scratch);
+    const float beta = before > 0.0f ? after / before : 0.0f;
+    for (uint index = at; index < count; index += size)
+        turn_one(index, beta, factor, z, p, polynomial);
+    if (at == 0)
+        rz_next[0] = after;
 }

@@ -1,11 +1,13 @@
 /*
  * An OpenCL driver for the tests of finding devices: one platform whose devices have a defect each,
- * or which fails as a whole when FAKE_ICD is "fail". The loader opens it through OCL_ICD_VENDORS.
+ * or which fails as a whole when FAKE_ICD is "fail". When it is "gpu", a GPU without a defect comes
+ * last. The loader opens it through OCL_ICD_VENDORS.
  */
 #include <CL/cl.h>
 #include <CL/cl_ext.h>
 #include <CL/cl_icd.h>
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -109,12 +111,14 @@ static struct _cl_device_id fake_devices[] = {
     {&dispatch, NULL, "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_TRUE},
     {&dispatch, "  Fake\t Full  4090 ", "OpenCL 3.0 x", CL_DEVICE_TYPE_ACCELERATOR, CL_TRUE,
      CL_TRUE},
+    {&dispatch, "Fake Screen", "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_TRUE},
 };
 
 static cl_int CL_API_CALL device_ids(cl_platform_id platform, cl_device_type type, cl_uint room,
                                      cl_device_id *ids, cl_uint *count) {
-    const cl_uint all = sizeof fake_devices / sizeof fake_devices[0];
     const char *mode = getenv("FAKE_ICD");
+    const bool gpu = mode && strcmp(mode, "gpu") == 0;
+    const cl_uint all = sizeof fake_devices / sizeof fake_devices[0] - (gpu ? 0 : 1);
     (void)platform, (void)type;
     if (mode && strcmp(mode, "fail") == 0)
         return CL_OUT_OF_RESOURCES;

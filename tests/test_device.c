@@ -147,6 +147,10 @@ static const char fill_source[] = "kernel void fill(global uint *out, uint count
                                   "    for (uint k = 0; k < get_local_size(0); k++)\n"
                                   "        sum += part[k];\n"
                                   "    out[i] = sum;\n"
+                                  "}\n"
+                                  "__attribute__((reqd_work_group_size(4, 1, 1)))\n"
+                                  "kernel void four(global uint *out) {\n"
+                                  "    out[0] = get_local_size(0);\n"
                                   "}\n";
 
 /* Runs `fill` of program "fill" over 100 values and checks them. */
@@ -230,11 +234,14 @@ static void test_list(void **state) {
     ovoid_context *context = NULL;
     ovoid_device_info *devices = NULL;
     size_t count = 0;
-    assert_int_equal(ovoid_devices(NULL, &devices, &count), OVOID_ERROR_ARGUMENT);
+    assert_int_equal(ovoid_devices(NULL, sizeof(ovoid_device_info), &devices, &count),
+                     OVOID_ERROR_ARGUMENT);
     check(context, ovoid_context_create(&context));
-    assert_int_equal(ovoid_devices(context, NULL, &count), OVOID_ERROR_ARGUMENT);
-    assert_int_equal(ovoid_devices(context, &devices, NULL), OVOID_ERROR_ARGUMENT);
-    check(context, ovoid_devices(context, &devices, &count));
+    assert_int_equal(ovoid_devices(context, sizeof(ovoid_device_info), NULL, &count),
+                     OVOID_ERROR_ARGUMENT);
+    assert_int_equal(ovoid_devices(context, sizeof(ovoid_device_info), &devices, NULL),
+                     OVOID_ERROR_ARGUMENT);
+    check(context, ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count));
     assert_true(count > 0);
     for (size_t i = 0; i < count; i++) {
         assert_int_equal(devices[i].index, i);
@@ -315,7 +322,7 @@ static void test_bad_selector(void **state) {
     const ovoid_device_info *before = ovoid_context_device(context);
     ovoid_device_info *devices;
     size_t count;
-    check(context, ovoid_devices(context, &devices, &count));
+    check(context, ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count));
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         assert_int_equal(ovoid_context_open_device(context, bad[i]), OVOID_ERROR_DEVICE);
         assert_contains(ovoid_context_error(context), bad[i]);
@@ -772,6 +779,39 @@ static void test_cache_modes(void **state) {
 
 /* ---- launches and buffers ----------------------------------------------------------------- */
 
+/* A group is no larger than the kernel's own limit, nor another than the one it was compiled for.
+ */
+static void test_groups(void **state) {
+    (void)state;
+    use_kernels("fill", fill_source);
+    ovoid_context *context = open_context();
+    ov_kernel fill = {0}, four = {0};
+    ov_buffer buffer = {0};
+    uint32_t count = 10, first = 5, out[16];
+    check(context, ov_kernel_create(context, "fill", "fill", &fill));
+    check(context, ov_kernel_create(context, "fill", "four", &four));
+    check(context, ov_buffer_reserve(context, &buffer, sizeof out, "out"));
+    assert_int_equal(fill.group, 0);
+    assert_int_equal(four.group, 4);
+
+    fill.max_group = 5; /* as for want of registers */
+    check(context,
+          OV_LAUNCH(context, &fill, 9, 8, OV_ARG(buffer.memory), OV_ARG(count), OV_ARG(first)));
+    check(context, ov_buffer_read(context, &buffer, 0, out, sizeof out));
+    assert_int_equal(out[9], 14);
+    assert_int_equal(out[10], 10); /* two groups of 5, not two of 8 */
+
+    assert_int_equal(OV_LAUNCH(context, &four, 8, 8, OV_ARG(buffer.memory)), OVOID_ERROR_ARGUMENT);
+    assert_contains(ovoid_context_error(context), "kernel four is compiled for groups of 4");
+    check(context, OV_LAUNCH(context, &four, 8, 4, OV_ARG(buffer.memory)));
+    check(context, ov_buffer_read(context, &buffer, 0, out, sizeof out));
+    assert_int_equal(out[0], 4);
+    ov_kernel_destroy(&fill);
+    ov_kernel_destroy(&four);
+    ov_buffer_destroy(&buffer);
+    ovoid_context_destroy(&context);
+}
+
 static void test_launch(void **state) {
     (void)state;
     use_kernels("fill", fill_source);
@@ -783,7 +823,7 @@ static void test_launch(void **state) {
     check(context, ov_kernel_create(context, "fill", "fill", &fill));
     check(context, ov_kernel_create(context, "fill", "total", &total));
     check(context, ov_buffer_reserve(context, &buffer, sizeof out, "out"));
-    uint64_t launches = context->device->launches;
+    uint64_t launches = context->device->counts[OVOID_COUNT_LAUNCHES];
 
     check(context,
           OV_LAUNCH(context, &fill, 10, 8, OV_ARG(buffer.memory), OV_ARG(count), OV_ARG(first)));
@@ -800,7 +840,7 @@ static void test_launch(void **state) {
     check(context, ov_buffer_read(context, &buffer, 0, out, sizeof out));
     assert_int_equal(out[0], 136);
     assert_int_equal(out[15], 136);
-    assert_int_equal(context->device->launches, launches + 3);
+    assert_int_equal(context->device->counts[OVOID_COUNT_LAUNCHES], launches + 3);
 
     first = 99;
     check(context,
@@ -816,14 +856,11 @@ static void test_launch(void **state) {
         OVOID_ERROR_OPENCL);
     assert_contains(ovoid_context_error(context), "clSetKernelArg: CL_INVALID_ARG_SIZE (-51)");
     assert_contains(ovoid_context_error(context), "argument 1 of kernel fill");
-    assert_int_equal(OV_LAUNCH(context, &fill, 8, fill.max_group + 1, OV_ARG(buffer.memory),
-                               OV_ARG(count), OV_ARG(first)),
-                     OVOID_ERROR_LIMIT);
-    assert_contains(ovoid_context_error(context), "kernel fill");
     assert_int_equal(
         OV_LAUNCH(context, &fill, SIZE_MAX, 8, OV_ARG(buffer.memory), OV_ARG(count), OV_ARG(first)),
         OVOID_ERROR_LIMIT);
-    assert_int_equal(context->device->launches, launches + 3); /* failures do not count */
+    assert_int_equal(context->device->counts[OVOID_COUNT_LAUNCHES],
+                     launches + 3); /* failures do not count */
     ov_kernel_destroy(&fill);
     ov_kernel_destroy(&total);
     ov_buffer_destroy(&buffer);
@@ -1051,7 +1088,7 @@ static int child(const char *selector) {
     if (ovoid_context_create(&context) != OVOID_OK)
         return 1;
     ovoid_context_on_warning(context, print_warning, NULL);
-    ovoid_status status = ovoid_devices(context, &devices, &count);
+    ovoid_status status = ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count);
     printf("devices: %s %zu\n", ovoid_status_name(status), count);
     for (size_t i = 0; i < count; i++)
         printf("device: [%s] [%s]\n", devices[i].name, devices[i].platform);
@@ -1208,6 +1245,9 @@ static void test_defective_devices(void **state) {
     text = CHILD("", vendors); /* passes over the defective GPUs */
     assert_contains(text, "device Fake Full 4090");
     free(text);
+    text = CHILD("", vendors, "FAKE_ICD=gpu"); /* the first GPU without one, before all others */
+    assert_contains(text, "device Fake Screen");
+    free(text);
     text = CHILD("nothing", vendors);
     assert_contains(text, "Fake Away, platform Fake Platform (is not available");
     free(text);
@@ -1308,6 +1348,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test_setup(test_cache_unwritable, clear_environment),
         cmocka_unit_test_setup(test_cache_folder, clear_environment),
         cmocka_unit_test_setup(test_cache_modes, clear_environment),
+        cmocka_unit_test_setup(test_groups, clear_environment),
         cmocka_unit_test_setup(test_launch, clear_environment),
         cmocka_unit_test_setup(test_buffer_growth, clear_environment),
         cmocka_unit_test_setup(test_many_writes, clear_environment),

@@ -322,11 +322,57 @@ static void test_far_chunks(void **state) {
     facets.chunk = mesh->triangles / OV_LEAF / BALLS;
     facets.batch = mesh->vertices / BALLS;
     const ov_sites sites = {.count = mesh->vertices, .trail = &trail};
-    const uint64_t before = device->launches;
+    const uint64_t before = device->counts[OVOID_COUNT_LAUNCHES];
     test_check(context, ov_facets_distances(context, &facets, &sites, squared));
-    assert_int_equal(device->launches - before, 2 * BALLS); /* the coarse ones, and one each */
+    assert_int_equal(device->counts[OVOID_COUNT_LAUNCHES] - before,
+                     2 * BALLS); /* the coarse ones, and one each */
     for (size_t v = 0; v < mesh->vertices; ++v)
         expect_near(squared[v], 0.0, 1e-9, "distance of a vertex from itself");
+    free(squared);
+    ov_facets_destroy(&facets);
+    ov_trail_destroy(&trail);
+    ovoid_mesh_destroy(&mesh);
+    shape_destroy(&s);
+}
+
+/* Chunks that may hold the nearest triangle are looked at, however close the call: sites off a
+ * surface in many chunks, in batches so small that their boxes do not hide it. */
+static void test_near_chunks(void **state) {
+    ovoid_context *const context = *state;
+    const size_t count = test_size(400, 24);
+    const double origin[3] = {0.0, 0.0, 0.0}, axes[3] = {3.0, 5.0, 8.0};
+    test_random random = {31};
+    shape s = {0};
+    shape_add_ellipsoid(&s, 3, axes, origin, false); /* 80 leaves, 5 chunks */
+    ovoid_mesh *mesh = shape_mesh(context, &s);
+    ov_trail trail = {0};
+    ov_facets facets = {0};
+    float *const xyz = test_alloc(3 * count, sizeof *xyz);
+    float *const squared = test_alloc(count, sizeof *squared);
+    for (size_t k = 0; k < count; ++k) /* from 1 to 6 angstrom outside, in order */
+        for (size_t j = 0; j < 3; ++j) {
+            const double angle = 2.0 * 3.14159265358979 * (double)k / (double)count;
+            const double way = j == 2 ? sin(5.0 * angle) : j == 1 ? cos(angle) : sin(angle);
+            xyz[3 * k + j] = (float)(way * (axes[j] + random_uniform(&random, 1.0, 6.0)));
+        }
+    test_check(context, ov_trail_create(context, mesh, false, &trail));
+    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    facets.chunk = OV_GROUP;
+    for (size_t batch = 1; batch <= 4; batch += 3) {
+        const ov_sites sites = {.count = count, .xyz = xyz};
+        size_t off = 0;
+        facets.batch = batch;
+        test_check(context, ov_facets_distances(context, &facets, &sites, squared));
+        for (size_t k = 0; k < count; ++k) {
+            const double point[3] = {xyz[3 * k], xyz[3 * k + 1], xyz[3 * k + 2]};
+            const double wanted = reference_mesh_distance(point, mesh, false);
+            expect_near(sqrt((double)squared[k]), wanted, 3e-6 * fmax(wanted, 1.0),
+                        "distance of a site");
+            off += wanted > 0.5;
+        }
+        assert_true(off > count / 2);
+    }
+    free(xyz);
     free(squared);
     ov_facets_destroy(&facets);
     ov_trail_destroy(&trail);
@@ -389,7 +435,7 @@ int main(void) {
         cmocka_unit_test(test_spheres),      cmocka_unit_test(test_ways),
         cmocka_unit_test(test_twin),         cmocka_unit_test(test_repeats),
         cmocka_unit_test(test_vertices),     cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_far_chunks),
+        cmocka_unit_test(test_far_chunks),   cmocka_unit_test(test_near_chunks),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

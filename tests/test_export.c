@@ -3,7 +3,7 @@
  * script is run by Python, in PyMOL itself where that is installed.
  */
 #include "comma.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 #include "scratch.h"
 #include "support.h"
 
@@ -117,7 +117,7 @@ static const char *next_line(const char *at) {
 static void bild_draws_the_ellipsoids(void **state) {
     ovoid_model *model = make_model(1);
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.opacity = 0.25;
     char *text = export_text(*state, model, "m.bild", &options);
     assert_non_null(strstr(text, "\n.color 0.3 0.55 0.8\n.transparency 0.75\n"));
@@ -144,7 +144,7 @@ static void bild_draws_the_ellipsoids(void **state) {
 static void cxc_draws_the_ellipsoids(void **state) {
     ovoid_model *model = make_model(1);
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.isovalue = 0.7; /* not the model's */
     options.colour[0] = 1.0;
     options.colour[1] = options.colour[2] = 0.0;
@@ -518,7 +518,7 @@ static void what_makes_no_sense_is_refused(void **state) {
     for (size_t i = 0; i < 3; i++) {
         for (int which = 0; which < 4; which++) {
             ovoid_export_options o;
-            ovoid_export_options_init(&o);
+            ovoid_export_options_init(&o, sizeof o);
             double *const value[] = {&o.isovalue, &o.spacing, &o.colour[2], &o.opacity};
             static const char *const text[] = {"isovalue", "spacing", "colour", "opacity"};
             *value[which] = wrong[i];

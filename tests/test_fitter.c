@@ -7,8 +7,6 @@
 #include "mixture/reduce.h"
 #include "support.h"
 
-#include "ovoid/surface.h"
-
 #define TOLERANCE 0.5
 #define PI 3.14159265358979323846
 /* What another start may cost: the search takes another way. */
@@ -132,7 +130,7 @@ static ovoid_molecule *molecule_at(ovoid_context *context, const ovoid_molecule 
 
 static ovoid_fit_options options_of(ovoid_goal goal, double value) {
     ovoid_fit_options options;
-    ovoid_fit_options_init(&options);
+    ovoid_fit_options_init(&options, sizeof options);
     options.adaptive.goal = goal;
     options.adaptive.tolerance = goal == OVOID_GOAL_TOLERANCE ? value : 0.5;
     options.adaptive.ellipsoids = goal == OVOID_GOAL_ELLIPSOIDS ? (uint32_t)value : 0;
@@ -153,6 +151,7 @@ static ovoid_model *reach(ovoid_context *context, ovoid_fitter *fitter, ovoid_go
                           double value, ovoid_fit_result *result) {
     const ovoid_fit_options options = options_of(goal, value);
     ovoid_model *model = NULL;
+    ovoid_fit_result_init(result, sizeof *result);
     test_check(context, ovoid_fitter_reach(context, fitter, &options, &model, result));
     assert_int_equal(ovoid_model_size(model), result->ellipsoids);
     return model;
@@ -162,7 +161,8 @@ static double deviation_of(ovoid_context *context, const ovoid_molecule *molecul
                            const ovoid_model *model) {
     ovoid_measure_options measuring;
     ovoid_measures measures;
-    ovoid_measure_options_init(&measuring);
+    ovoid_measures_init(&measures, sizeof measures);
+    ovoid_measure_options_init(&measuring, sizeof measuring);
     test_check(context, ovoid_measure(context, molecule, model, &measuring, &measures));
     return measures.deviation;
 }
@@ -191,6 +191,8 @@ static void expect_as_alone(ovoid_context *context, const ovoid_molecule *molecu
                             ovoid_fitter *fitter, const ovoid_fit_options *options) {
     ovoid_model *alone = NULL, *model = NULL;
     ovoid_fit_result wanted, result;
+    ovoid_fit_result_init(&wanted, sizeof wanted);
+    ovoid_fit_result_init(&result, sizeof result);
     test_check(context, ovoid_fit(context, molecule, options, &alone, &wanted));
     const unsigned before = calls.samplings;
     test_check(context, ovoid_fitter_reach(context, fitter, options, &model, &result));
@@ -198,7 +200,7 @@ static void expect_as_alone(ovoid_context *context, const ovoid_molecule *molecu
                   calls.samplings - before);
     expect_same(alone, model);
     assert_int_equal(result.iterations, wanted.iterations);
-    assert_int_equal(result.solver_iterations, wanted.solver_iterations);
+    assert_int_equal(result.adaptive.solver_iterations, wanted.adaptive.solver_iterations);
     assert_int_equal(result.points, wanted.points);
     assert_true(result.spacing == wanted.spacing);
     assert_true(result.distance == wanted.distance ||
@@ -350,6 +352,7 @@ static void frames(void **state) {
         double *const xyz = place(molecule, places[n]);
         ovoid_molecule *moved = molecule_at(*state, molecule, xyz);
         ovoid_model *other = NULL;
+        ovoid_fit_result_init(&alone, sizeof alone);
         test_check(*state, ovoid_fitter_move(*state, fitter, xyz));
         count_calls(moved);
         model = reach(*state, fitter, OVOID_GOAL_TOLERANCE, TOLERANCE, &result);
@@ -460,7 +463,7 @@ static bool expect_stop(ovoid_context *context, const ovoid_molecule *molecule,
     stopper s = {.stop_at = at};
     ovoid_fit_result result, untouched;
     ovoid_model *model = (void *)&s;
-    memset(&untouched, 0x5a, sizeof untouched);
+    ovoid_fit_result_init(&untouched, sizeof untouched);
     memcpy(&result, &untouched, sizeof result);
     ovoid_context_on_progress(context, stop_there, &s);
     test_refused(context, ovoid_fitter_reach(context, fitter, options, &model, &result),

@@ -2,7 +2,50 @@
  * The paper's Algorithm 1, step by step, seen through its progress records and checked in double:
  * start, weights, gate, gradient step, line search, pruning, phases, end.
  */
+#include "fit/l1/objective.h"
 #include "support.h"
+
+/* ---- between the method and its objective ------------------------------------------------- */
+
+/* The linker hands calls of the objective to these (tests/CMakeLists.txt). */
+static struct {
+    double *x; /* evaluated last, `count` ellipsoids */
+    size_t count;
+    size_t gradients;   /* asked for */
+    size_t refuse_from; /* the gradient after which trials are refused, `refuse` of them; 0: none */
+    size_t refuse;
+} calls;
+
+ovoid_status __real_ov_l1_evaluate(ov_l1_objective *, const double *, size_t, ov_l1_evaluation *);
+ovoid_status __real_ov_l1_gradient(ov_l1_objective *, const double *, size_t, ov_l1_weights,
+                                   double *);
+ovoid_status __wrap_ov_l1_evaluate(ov_l1_objective *, const double *, size_t, ov_l1_evaluation *);
+ovoid_status __wrap_ov_l1_gradient(ov_l1_objective *, const double *, size_t, ov_l1_weights,
+                                   double *);
+
+ovoid_status __wrap_ov_l1_evaluate(ov_l1_objective *objective, const double *x, size_t count,
+                                   ov_l1_evaluation *result) {
+    const ovoid_status status = __real_ov_l1_evaluate(objective, x, count, result);
+    calls.x = realloc(calls.x, count * OV_L1_PARAMETERS * sizeof *x);
+    if (!calls.x)
+        abort();
+    memcpy(calls.x, x, count * OV_L1_PARAMETERS * sizeof *x);
+    calls.count = count;
+    if (calls.refuse_from && calls.gradients >= calls.refuse_from && calls.refuse) {
+        --calls.refuse;
+        return ov_fail(objective->context, OVOID_ERROR_NUMERIC, "no model");
+    }
+    return status;
+}
+
+/* The residual on the device, of which a gradient is made, is that of the parameters it is for. */
+ovoid_status __wrap_ov_l1_gradient(ov_l1_objective *objective, const double *x, size_t count,
+                                   ov_l1_weights w, double *gradient) {
+    ++calls.gradients;
+    assert_int_equal(count, calls.count);
+    assert_memory_equal(x, calls.x, count * OV_L1_PARAMETERS * sizeof *x);
+    return __real_ov_l1_gradient(objective, x, count, w, gradient);
+}
 
 typedef struct trace {
     ovoid_progress *records; /* one of each iteration */
@@ -27,6 +70,7 @@ static bool record(const ovoid_progress *progress, void *user) {
 /* Everything is set here, whatever the defaults are. */
 static ovoid_fit_options options_for(uint32_t sparse_iterations, uint32_t iterations) {
     const ovoid_fit_options options = {
+        .size = sizeof options,
         .method = OVOID_METHOD_L1,
         .decay = 0.5,
         .isovalue = 1.0,
@@ -67,6 +111,7 @@ static void run_fit(ovoid_context *context, const double *xyzr, size_t atoms,
     ovoid_molecule *molecule = NULL;
     memset(run, 0, sizeof *run);
     test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
+    ovoid_fit_result_init(&run->result, sizeof run->result);
     ovoid_context_on_progress(context, record, &run->trace);
     test_check(context, ovoid_fit(context, molecule, options, &run->model, &run->result));
     ovoid_context_on_progress(context, NULL, NULL);
@@ -139,11 +184,11 @@ static void starts_with_the_atoms(void **state) {
     const ovoid_progress *const first = &run.trace.records[0];
     for (size_t i = 0; i < ATOMS; ++i)
         sparse += exp(0.25 * clump[4 * i + 3] * clump[4 * i + 3]) + 3.0 * sqrt(0.5);
-    const double accuracy = sparse * first->accuracy_weight / first->sparse_weight;
+    const double accuracy = sparse * first->l1.accuracy_weight / first->l1.sparse_weight;
     print_message("E_s at the start: %.3g at %zu points\n", accuracy, (size_t)first->points);
     /* each of the fit's terms may miss its cut-off, 1e-5, at each point */
     assert_true(accuracy <= (double)first->points * pow(ATOMS * 1e-5 + 5e-6, 2.0));
-    expect_near(first->accuracy_weight + first->sparse_weight, 1.0, 1e-12, "w_s + w_l");
+    expect_near(first->l1.accuracy_weight + first->l1.sparse_weight, 1.0, 1e-12, "w_s + w_l");
     /* one step of at most 0.2 in any parameter */
     const ovoid_ellipsoid *const e = ovoid_model_ellipsoids(run.model);
     assert_int_equal(ovoid_model_size(run.model), ATOMS);
@@ -182,9 +227,9 @@ static void expect_step(ovoid_context *context, ovoid_kernel kernel, uint32_t in
     assert_int_equal(after.trace.count, iterations + 1);
     const ovoid_progress *const step = &after.trace.records[iterations];
     /* the first fit is the beginning of the second */
-    assert_true(before.trace.records[iterations - 1].accuracy_term ==
-                after.trace.records[iterations - 1].accuracy_term);
-    assert_true(step->step > 0.0);
+    assert_true(before.trace.records[iterations - 1].l1.accuracy_term ==
+                after.trace.records[iterations - 1].l1.accuracy_term);
+    assert_true(step->l1.step > 0.0);
 
     double *const x = parameters_of(before.model), *const next = parameters_of(after.model);
     const size_t points = points_of(context, clump, ATOMS, &options, &xyz, &target);
@@ -199,19 +244,19 @@ static void expect_step(ovoid_context *context, ovoid_kernel kernel, uint32_t in
         const double down = reference_accuracy(x, ATOMS, xyz, target, points, limit);
         x[j] = middle;
         const double accuracy =
-            j % 10 < moving ? step->accuracy_weight * (up - down) / (2.0 * h) : 0.0;
-        gradient[j] =
-            accuracy + (j % 10 < penalised ? step->sparse_weight * (x[j] > 0.0 ? 1.0 : -1.0) : 0);
+            j % 10 < moving ? step->l1.accuracy_weight * (up - down) / (2.0 * h) : 0.0;
+        gradient[j] = accuracy +
+                      (j % 10 < penalised ? step->l1.sparse_weight * (x[j] > 0.0 ? 1.0 : -1.0) : 0);
         largest = fmax(largest, fabs(gradient[j]));
         largest_accuracy = fmax(largest_accuracy, fabs(accuracy));
     }
     print_message("%s%s step %.3g: largest derivative %.3g, of w_s E_s alone %.3g\n", step->stage,
-                  spheres ? " spheres'" : "", step->step, largest, largest_accuracy);
+                  spheres ? " spheres'" : "", step->l1.step, largest, largest_accuracy);
     assert_true(largest_accuracy > 0.1 * largest);
     for (size_t j = 0; j < 10 * ATOMS; ++j) {
         char what[64];
         snprintf(what, sizeof what, "the way of parameter %zu", j);
-        expect_near((x[j] - next[j]) / step->step, gradient[j], 3e-3 * largest, what);
+        expect_near((x[j] - next[j]) / step->l1.step, gradient[j], 3e-3 * largest, what);
     }
     free(x);
     free(next);
@@ -266,7 +311,8 @@ static void spheres_change_amplitudes_alone(void **state) {
     assert_true(moved > 0.01);
     if (!test_small())
         assert_true(count < ATOMS);
-    expect_near(run.trace.records[run.trace.count - 1].sparse_term, sparse, 1e-12 * sparse, "E_l1");
+    expect_near(run.trace.records[run.trace.count - 1].l1.sparse_term, sparse, 1e-12 * sparse,
+                "E_l1");
     destroy_run(&run);
 }
 
@@ -285,27 +331,27 @@ static void weights_follow_the_algorithm(void **state) {
         const ovoid_progress *const now = &run.trace.records[n], *const before = now - 1;
         assert_int_equal(now->iteration, n + 1);
         assert_int_equal(now->iterations, all);
-        expect_near(now->objective,
-                    now->accuracy_weight * now->accuracy_term +
-                        now->sparse_weight * now->sparse_term,
-                    1e-12 * now->objective, "the objective");
+        expect_near(now->l1.objective,
+                    now->l1.accuracy_weight * now->l1.accuracy_term +
+                        now->l1.sparse_weight * now->l1.sparse_term,
+                    1e-12 * now->l1.objective, "the objective");
         if (now->iteration > sparse) {
             assert_string_equal(now->stage, "accuracy");
-            assert_true(now->accuracy_weight == 1.0 && now->sparse_weight == 0.0);
+            assert_true(now->l1.accuracy_weight == 1.0 && now->l1.sparse_weight == 0.0);
             continue;
         }
         assert_string_equal(now->stage, "sparse");
-        if (n == 0 || now->ellipsoids != before->ellipsoids || before->step == 0.0)
+        if (n == 0 || now->ellipsoids != before->ellipsoids || before->l1.step == 0.0)
             continue; /* E_s was evaluated anew */
-        if (before->max_error > options.l1.max_error) {
-            assert_true(now->accuracy_weight == 1.0 && now->sparse_weight == 0.0);
+        if (before->l1.max_error > options.l1.max_error) {
+            assert_true(now->l1.accuracy_weight == 1.0 && now->l1.sparse_weight == 0.0);
             ++gated;
             continue;
         }
-        const double total = before->accuracy_term + before->sparse_term;
-        const double share = before->accuracy_term / total;
-        expect_near(now->accuracy_weight, fmax(share, options.l1.epsilon), 1e-12, "w_s");
-        expect_near(now->sparse_weight, before->sparse_term / total, 1e-12, "w_l");
+        const double total = before->l1.accuracy_term + before->l1.sparse_term;
+        const double share = before->l1.accuracy_term / total;
+        expect_near(now->l1.accuracy_weight, fmax(share, options.l1.epsilon), 1e-12, "w_s");
+        expect_near(now->l1.sparse_weight, before->l1.sparse_term / total, 1e-12, "w_l");
         bounded += share < options.l1.epsilon;
         balanced += share >= options.l1.epsilon;
     }
@@ -329,7 +375,7 @@ static void gate_can_be_open_or_shut(void **state) {
         /* from the second on: the start may be exact */
         for (size_t k = 1; k < run.trace.count; ++k)
             if (strcmp(run.trace.records[k].stage, "sparse") == 0)
-                assert_int_equal(run.trace.records[k].sparse_weight == 0.0, n == 0);
+                assert_int_equal(run.trace.records[k].l1.sparse_weight == 0.0, n == 0);
         destroy_run(&run);
     }
 }
@@ -348,18 +394,18 @@ static void accepted_steps_descend(void **state) {
         run_fit(*state, clump, ATOMS, &options, &run);
         for (size_t n = 1; n < run.trace.count; ++n) {
             const ovoid_progress *const now = &run.trace.records[n], *const before = now - 1;
-            const double start = now->accuracy_weight * before->accuracy_term +
-                                 now->sparse_weight * before->sparse_term;
-            if (now->step > 0.0 && before->step > 0.0)
-                assert_true(now->objective < start);
+            const double start = now->l1.accuracy_weight * before->l1.accuracy_term +
+                                 now->l1.sparse_weight * before->l1.sparse_term;
+            if (now->l1.step > 0.0 && before->l1.step > 0.0)
+                assert_true(now->l1.objective < start);
             else
-                assert_true(now->objective <= start * (1.0 + 1e-3) + 1e-6);
+                assert_true(now->l1.objective <= start * (1.0 + 1e-3) + 1e-6);
         }
         const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
         const ovoid_progress *const turn = &run.trace.records[sparse - 1];
-        print_message("E_s %.4g after the sparse phase, %.4g at the end\n", turn->accuracy_term,
-                      last->accuracy_term);
-        assert_true(last->accuracy_term < turn->accuracy_term);
+        print_message("E_s %.4g after the sparse phase, %.4g at the end\n", turn->l1.accuracy_term,
+                      last->l1.accuracy_term);
+        assert_true(last->l1.accuracy_term < turn->l1.accuracy_term);
         destroy_run(&run);
     }
 }
@@ -443,9 +489,9 @@ static void sparse_phase_shrinks_the_l1_term(void **state) {
     run_fit(*state, clump, ATOMS, &options, &run);
     const ovoid_progress *const first = &run.trace.records[0];
     const ovoid_progress *const last = &run.trace.records[run.trace.count - 1];
-    print_message("E_l1 %.4g -> %.4g, largest error %.3g\n", first->sparse_term, last->sparse_term,
-                  last->max_error);
-    assert_true(last->sparse_term < first->sparse_term - (test_small() ? 0.01 : 0.3));
+    print_message("E_l1 %.4g -> %.4g, largest error %.3g\n", first->l1.sparse_term,
+                  last->l1.sparse_term, last->l1.max_error);
+    assert_true(last->l1.sparse_term < first->l1.sparse_term - (test_small() ? 0.01 : 0.3));
     destroy_run(&run);
 }
 
@@ -505,6 +551,40 @@ static void inside_is_held(void **state) {
     assert_true(least_inside(*state, xyzr, atoms, 0) < 0.5);
 }
 
+/* ---- trials that are no model ------------------------------------------------------------- */
+
+/* Where the first trials of a search are no models, the search goes on with shorter steps; where
+ * none of them is, the iteration changes nothing, and the next one begins again at x. */
+static void refused_trials_are_rejected(void **state) {
+    const uint32_t backtracks = 4;
+    for (int whole = 0; whole < 2; ++whole) {
+        fit_run run;
+        ovoid_fit_options options = options_for(4, 4);
+        options.l1.first_step = OVOID_FIRST_STEP_GROW;
+        options.l1.max_backtracks = backtracks;
+        memset(&calls, 0, sizeof calls);
+        calls.refuse_from = 2;
+        calls.refuse = whole ? backtracks : 1;
+        run_fit(*state, clump, ATOMS, &options, &run);
+        assert_int_equal(calls.refuse, 0);
+        assert_int_equal(run.result.iterations, 4);
+        assert_int_equal(calls.gradients, 4);
+        const ovoid_progress *const r = run.trace.records;
+        assert_true(r[0].l1.step > 0.0);
+        if (whole) {
+            assert_true(r[1].l1.step == 0.0);
+            assert_true(r[1].l1.accuracy_term == r[0].l1.accuracy_term);
+        } else {
+            assert_true(r[1].l1.step > 0.0);
+            assert_true(r[1].l1.step <= options.l1.shrink * options.l1.grow * r[0].l1.step);
+        }
+        assert_true(r[2].l1.step > 0.0 && r[3].l1.step > 0.0);
+        destroy_run(&run);
+        free(calls.x);
+        memset(&calls, 0, sizeof calls);
+    }
+}
+
 /* ---- the end ------------------------------------------------------------------------------ */
 
 /* Where nothing can be gained the fit ends long before MaxNiter, with the atoms' own Gaussians. */
@@ -519,7 +599,7 @@ static void ends_where_nothing_changes(void **state) {
     assert_int_equal(run.result.iterations, run.trace.count);
     assert_int_equal(run.trace.records[run.trace.count - 1].iteration, run.trace.count);
     assert_int_equal(run.result.ellipsoids, ATOMS);
-    assert_true(run.result.max_error < 2e-4);
+    assert_true(run.result.l1.max_error < 2e-4);
     destroy_run(&run);
 }
 
@@ -535,18 +615,18 @@ static void result_is_the_last_record(void **state) {
     assert_int_equal(result->points, last->points);
     assert_int_equal(result->ellipsoids, last->ellipsoids);
     assert_int_equal(result->ellipsoids, ovoid_model_size(run.model));
-    expect_near(result->rms_error, sqrt(last->accuracy_term / (double)last->points), 1e-12,
+    expect_near(result->l1.rms_error, sqrt(last->l1.accuracy_term / (double)last->points), 1e-12,
                 "the rms error");
-    assert_true(result->max_error == last->max_error);
+    assert_true(result->l1.max_error == last->l1.max_error);
     double *const x = parameters_of(run.model);
-    expect_near(last->sparse_term, reference_sparsity(x, (size_t)result->ellipsoids),
-                1e-9 * last->sparse_term, "E_l1");
+    expect_near(last->l1.sparse_term, reference_sparsity(x, (size_t)result->ellipsoids),
+                1e-9 * last->l1.sparse_term, "E_l1");
     /* and E_s that of the model, by the paper's formula */
     double *xyz, *target;
     const size_t points = points_of(*state, clump, ATOMS, &options, &xyz, &target);
     const double accuracy =
         reference_accuracy(x, (size_t)result->ellipsoids, xyz, target, points, limit_of(&options));
-    expect_near(last->accuracy_term, accuracy, 2e-3 * accuracy, "E_s");
+    expect_near(last->l1.accuracy_term, accuracy, 2e-3 * accuracy, "E_s");
     free(x);
     free(xyz);
     free(target);
@@ -566,6 +646,7 @@ int main(void) {
         cmocka_unit_test(pruning_leaves_one),
         cmocka_unit_test(sparse_phase_shrinks_the_l1_term),
         cmocka_unit_test(inside_is_held),
+        cmocka_unit_test(refused_trials_are_rejected),
         cmocka_unit_test(ends_where_nothing_changes),
         cmocka_unit_test(result_is_the_last_record),
     };

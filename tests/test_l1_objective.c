@@ -37,6 +37,63 @@ static double *make_samples(ovoid_context *context, test_random *random, size_t 
     return packed;
 }
 
+/* ---- lists that could not be built --------------------------------------------------------- */
+
+/* The linker hands ov_lists_build() to this (tests/CMakeLists.txt). */
+static enum { BUILD, REFUSE, REFUSE_AFTERWARDS } lists_are;
+ovoid_status __real_ov_lists_build(ovoid_context *, ov_lists *, const ov_points *, const ov_terms *,
+                                   double);
+ovoid_status __wrap_ov_lists_build(ovoid_context *, ov_lists *, const ov_points *, const ov_terms *,
+                                   double);
+ovoid_status __wrap_ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                                   const ov_terms *terms, double skin) {
+    ovoid_status status = OVOID_OK;
+    if (lists_are != REFUSE)
+        status = __real_ov_lists_build(context, lists, points, terms, skin);
+    return lists_are == BUILD ? status : ov_fail(context, OVOID_ERROR_MEMORY, "no room for lists");
+}
+
+/* After a failure the lists are those of neither the parameters before it nor the new ones. */
+static void lists_are_made_after_a_failure(void **state) {
+    const size_t terms = 3, count = 150;
+    const double half[3] = {7.9, 7.9, 7.9};
+    test_random random = {77};
+    ov_samples samples;
+    ov_l1_objective objective;
+    ov_l1_evaluation here, there, result;
+    double *targets;
+    double *const xyz = make_samples(*state, &random, count, half, 1.0, &samples, &targets);
+    double x[3 * SIZE] = {0}, moved[3 * SIZE];
+    for (size_t i = 0; i < terms; ++i) {
+        x[i * SIZE + OV_L1_C] = 1.5;
+        for (int k = 0; k < 3; ++k) {
+            x[i * SIZE + OV_L1_D + k] = 0.6;
+            x[i * SIZE + OV_L1_CENTRE + k] = i == (size_t)k ? 5.0 : -3.0;
+        }
+    }
+    for (size_t j = 0; j < terms * SIZE; ++j)
+        moved[j] = j % SIZE >= OV_L1_CENTRE && j % SIZE < OV_L1_CENTRE + 3 ? -x[j] : x[j];
+    test_check(*state, ov_l1_objective_create(*state, &samples, INFINITY, OVOID_KERNEL_ELLIPSOID,
+                                              terms, &objective));
+    test_check(*state, ov_l1_evaluate(&objective, moved, terms, &there));
+    test_check(*state, ov_l1_evaluate(&objective, x, terms, &here));
+    for (int n = 0; n < 4; ++n) {
+        const bool back = n % 2;
+        lists_are = n < 2 ? REFUSE : REFUSE_AFTERWARDS;
+        test_refused(*state, ov_l1_evaluate(&objective, moved, terms, &result), OVOID_ERROR_MEMORY,
+                     "no room for lists");
+        lists_are = BUILD;
+        test_check(*state, ov_l1_evaluate(&objective, back ? x : moved, terms, &result));
+        assert_true(result.accuracy == (back ? here : there).accuracy);
+        test_check(*state, ov_l1_evaluate(&objective, x, terms, &result));
+        assert_true(result.accuracy == here.accuracy);
+    }
+    ov_l1_objective_destroy(&objective);
+    ov_samples_destroy(&samples);
+    free(targets);
+    free(xyz);
+}
+
 /* ---- lists -------------------------------------------------------------------------------- */
 
 typedef enum motion { DRIFT, GROWTH, TURN, ALL, JUMP, MOTIONS } motion;
@@ -295,6 +352,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lists_follow_moving_ellipsoids),
         cmocka_unit_test(lists_follow_pruning),
+        cmocka_unit_test(lists_are_made_after_a_failure),
         cmocka_unit_test(gradient_equals_central_differences),
         cmocka_unit_test(gradient_at_zero),
     };

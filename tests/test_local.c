@@ -135,7 +135,7 @@ static bool sees_all(const ov_local *local, const row *r, const double *x) {
     for (size_t k = 0; k < r->s.points; ++k) {
         bool kept = reference_field(&quadric, 1, r->s.xyz + 3 * k).value < 1e-3;
         for (size_t n = 0; n < local->points.packs && !kept; ++n)
-            kept = local->packs[n] == k / OV_PACK;
+            kept = local->packs.pack[n] == k / OV_PACK;
         if (!kept)
             return false;
     }
@@ -230,6 +230,47 @@ static void cancelling_leaves_all_as_it_was(void **state) {
     row_destroy(&r);
 }
 
+/* Bytes each way that refining the first three ellipsoids takes in a row of so many, and reads. */
+typedef struct cost {
+    uint64_t up, down, reads;
+} cost;
+
+static cost cost_in_a_row(ovoid_context *context, size_t count) {
+    row r;
+    ov_local local = {.refiner = {.context = context}};
+    row_create(&r, context, count, 0.02, 7);
+    bool *const chosen = test_alloc(count, sizeof *chosen);
+    for (size_t i = 0; i < count; ++i)
+        chosen[i] = i < 3;
+    const ov_device *const device = context->device;
+    const cost before = {device->counts[OVOID_COUNT_BYTES_TO_DEVICE],
+                         device->counts[OVOID_COUNT_BYTES_FROM_DEVICE],
+                         device->counts[OVOID_COUNT_BLOCKING_READS]};
+    refine_some(&local, &r, 2, chosen, r.x);
+    test_check(context, ov_target_emphasise(context, &r.s.target, r.s.quadrics->centre,
+                                            sizeof *r.s.quadrics, 3, 2.0, 2.0));
+    const cost after = {device->counts[OVOID_COUNT_BYTES_TO_DEVICE] - before.up,
+                        device->counts[OVOID_COUNT_BYTES_FROM_DEVICE] - before.down,
+                        device->counts[OVOID_COUNT_BLOCKING_READS] - before.reads};
+    print_message("%zu ellipsoids, %zu packs: %llu bytes up, %llu down, %llu reads\n", count,
+                  r.s.samples.points.packs, (unsigned long long)after.up,
+                  (unsigned long long)after.down, (unsigned long long)after.reads);
+    free(chosen);
+    ov_local_destroy(&local);
+    row_destroy(&r);
+    return after;
+}
+
+/* What it costs goes with what is refined, not with the molecule. */
+static void far_ellipsoids_cost_little(void **state) {
+    test_skip_simulated(*state);
+    const cost small = cost_in_a_row(*state, 12), large = cost_in_a_row(*state, 48);
+    const uint64_t terms = 36 * sizeof(ov_term); /* they are looked at, though */
+    assert_true(large.up < small.up + small.up / 4 + 2 * terms);
+    assert_true(large.down < small.down + small.down / 4 + 2 * terms);
+    assert_true(large.reads <= small.reads + 2); /* lists may need a second walk */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_others_stay_and_the_whole_gains),
@@ -238,6 +279,7 @@ int main(void) {
         cmocka_unit_test(all_chosen_is_everything),
         cmocka_unit_test(none_chosen_changes_nothing),
         cmocka_unit_test(cancelling_leaves_all_as_it_was),
+        cmocka_unit_test(far_ellipsoids_cost_little),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

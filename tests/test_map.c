@@ -3,7 +3,7 @@
  * and by gemmi and PyMOL where those are installed; their values are those of the reference.
  */
 #include "model/ellipsoid.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 #include "scratch.h"
 #include "support.h"
 
@@ -256,7 +256,7 @@ static void maps_hold_the_field(void **state) {
     for (int which = 0; which < 2; which++) {
         subject s = which ? molecule_subject(context) : model_subject(context);
         ovoid_export_options options;
-        ovoid_export_options_init(&options);
+        ovoid_export_options_init(&options, sizeof options);
         options.spacing = test_small() ? 1.3 : 0.37;
         for (size_t i = 0; i < FORMATS; i++) {
             const char *path = scratch_path(*state, formats[i].name);
@@ -276,7 +276,7 @@ static void maps_hold_the_field(void **state) {
 static void isovalue_sets_the_room(void **state) {
     subject s = model_subject(context);
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = 1.1;
     size_t before = SIZE_MAX;
     for (double isovalue = 1e-4; isovalue < 200.0; isovalue *= 100.0) {
@@ -314,7 +314,7 @@ static void large_maps_come_in_pieces(void **state) {
     subject s = model_subject(context);
     ovoid_export_options options;
     watch w = {0};
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = 0.08;
     for (size_t i = 0; i < FORMATS; i += 3) {
         const char *path = scratch_path(*state, formats[i].name);
@@ -340,7 +340,7 @@ static void large_maps_come_in_pieces(void **state) {
 static void maps_far_out(void **state) {
     static const double at[][3] = {{150, -3, 12}, {-2000, 1, 3000.7}, {1e4, 1e4, -1e4}};
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     for (size_t n = 0; n < sizeof at / sizeof *at; n++) {
         subject s = {.count = 1, .quadrics = test_alloc(1, sizeof(ov_quadric))};
         const double xyzr[4] = {at[n][0], at[n][1], at[n][2], 1.7};
@@ -369,7 +369,7 @@ static void large_maps_are_asked_for(void **state) {
     const double xyzr[8] = {0, 0, 0, 1.5, 5e4, 0, 0, 1.5};
     subject s = {.count = 2, .quadrics = test_alloc(2, sizeof(ov_quadric))};
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     assert_true(options.max_gigabytes == OVOID_DEFAULT_MAP_GIGABYTES);
     test_check(context, ovoid_molecule_create(context, xyzr, 2, &s.molecule));
     options.spacing = 5.0;
@@ -398,7 +398,7 @@ static void pipes_get_no_statistics(void **state) {
     subject s = model_subject(context);
     ovoid_export_options options;
     char command[700];
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = 0.9;
     const char *fifo = scratch_path(*state, "m.mrc"), *copy = scratch_path(*state, "copy");
     assert_int_equal(mkfifo(fifo, 0600), 0);
@@ -418,7 +418,7 @@ static void failures_leave_nothing(void **state) {
     scratch *f = *state;
     subject s = model_subject(context);
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = test_small() ? 0.9 : 0.3; /* must overflow a buffer */
     if (access("/dev/full", W_OK) == 0) {
         for (size_t i = 0; i < FORMATS; i++) {
@@ -498,7 +498,7 @@ static void gemmi_reads_it(void **state) {
     }
     subject s = model_subject(context);
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = 0.4;
     const char *path = scratch_path(*state, "m.map"), *driver = scratch_path(*state, "read.py");
     scratch_write(driver, script, sizeof script - 1);
@@ -537,7 +537,7 @@ static void pymol_opens_it(void **state) {
     subject s = model_subject(context);
     ovoid_export_options options;
     char driver[1000], command[1200];
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = 0.4;
     const int length = snprintf(driver, sizeof driver, script, probe[0], probe[1], probe[2]);
     scratch_write(scratch_path(*state, "show.py"), driver, (size_t)length);

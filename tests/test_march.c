@@ -299,7 +299,7 @@ static ovoid_mesh *expect_atoms(ovoid_context *context, const double *xyzr, size
 
 static ovoid_mesh_options options_of(double isovalue, double spacing, ovoid_vertex_rule rule) {
     ovoid_mesh_options options;
-    ovoid_mesh_options_init(&options);
+    ovoid_mesh_options_init(&options, sizeof options);
     assert_true(options.isovalue == 1.0 && options.spacing == OVOID_DEFAULT_MESH_SPACING);
     assert_true(options.vertices == OVOID_VERTEX_EXACT);
     options.isovalue = isovalue;
@@ -1012,7 +1012,7 @@ static void refusals(void **state) {
     ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
     test_check(*state, ovoid_molecule_create(*state, xyzr, 1, &molecule));
     test_check(*state, ovoid_model_create(*state, &huge, 1, 0.5, 1.0, &model));
-    ovoid_mesh_options_init(NULL);
+    ovoid_mesh_options_init(NULL, sizeof options);
     test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, NULL, &mesh),
                  OVOID_ERROR_ARGUMENT, "NULL");
     test_refused(*state, ovoid_model_mesh(*state, NULL, &options, &mesh), OVOID_ERROR_ARGUMENT,

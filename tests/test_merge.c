@@ -81,7 +81,7 @@ static float *run_losses(bench *b, const charges *c, const uint32_t *pairs,
     test_check(context, ov_buffer_reserve(context, &loss, count * sizeof(float), "losses"));
     const size_t lanes = device->shape.lanes;
     test_check(context,
-               OV_LAUNCH(context, &kernel, count * lanes, lanes, OV_ARG(pairs_count),
+               OV_LAUNCH(context, &kernel, count * lanes, device->team, OV_ARG(pairs_count),
                          OV_ARG(list.memory), OV_ARG(terms.device.memory),
                          OV_ARG(b->points.xyz.memory), OV_ARG(b->points.pack_origins.memory),
                          OV_ARG(value.memory), OV_ARG(low.memory), OV_ARG(high.memory),

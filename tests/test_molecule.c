@@ -73,7 +73,7 @@ static ovoid_molecule *expect_atoms(const char *name, const void *bytes, size_t 
     if (read_bytes(name, bytes, count, &molecule) != OVOID_OK)
         fail_msg("%s", ovoid_context_error(context));
     assert_int_equal(ovoid_molecule_atoms(molecule), atoms);
-    assert_int_equal(ovoid_molecule_read_counts(molecule).atoms, atoms);
+    assert_int_equal(ovoid_molecule_read_counts(molecule)->atoms, atoms);
     return molecule;
 }
 
@@ -347,7 +347,7 @@ static void pqr_records_are_told_apart(void **state) {
     ovoid_molecule *molecule = expect_atoms("records.pqr", file, sizeof file - 1, 2);
     for (int i = 0; i < 2; i++)
         expect_atom(molecule, (size_t)i, i + 1, 2, 3, i == 0 ? 0 : 1.5);
-    ovoid_molecule_counts counts = ovoid_molecule_read_counts(molecule);
+    ovoid_molecule_counts counts = *ovoid_molecule_read_counts(molecule);
     assert_int_equal(counts.lines, 17);
     assert_int_equal(counts.zero_radius, 1);
     assert_int_equal(counts.skipped, 1);
@@ -361,7 +361,7 @@ static void pqr_records_are_told_apart(void **state) {
 static void expect_models(const char *file, double x, size_t skipped) {
     ovoid_molecule *molecule = expect_atoms("models.pqr", file, strlen(file), 1);
     expect_atom(molecule, 0, x, 0, 0, 1);
-    ovoid_molecule_counts counts = ovoid_molecule_read_counts(molecule);
+    ovoid_molecule_counts counts = *ovoid_molecule_read_counts(molecule);
     assert_int_equal(counts.skipped, skipped);
     assert_int_equal(counts.skipped_models, skipped);
     assert_int_equal(counts.skipped_altlocs, 0);
@@ -421,7 +421,7 @@ static void xyzr_lines_are_read(void **state) {
         expect_atom(molecule, 0, 1.5, 2.5, -3.5, 1.25);
         if (cases[i].atoms == 2)
             expect_atom(molecule, 1, 4, 5, 6, 0);
-        assert_int_equal(ovoid_molecule_read_counts(molecule).zero_radius, cases[i].atoms - 1);
+        assert_int_equal(ovoid_molecule_read_counts(molecule)->zero_radius, cases[i].atoms - 1);
         ovoid_molecule_destroy(&molecule);
     }
 }
@@ -599,7 +599,7 @@ static void line_endings_do_not_matter(void **state) {
             expect_atoms("lines.xyzr", cases[i].file, strlen(cases[i].file), 2);
         expect_atom(molecule, 0, 1, 2, 3, 4);
         expect_atom(molecule, 1, 5, 6, 7, 8);
-        assert_int_equal(ovoid_molecule_read_counts(molecule).lines, cases[i].lines);
+        assert_int_equal(ovoid_molecule_read_counts(molecule)->lines, cases[i].lines);
         ovoid_molecule_destroy(&molecule);
     }
     expect_failure("crlf.xyzr", TEXT("1 2 3 4\r\n5 6 7 8\r\n9 x\r\n"), OVOID_ERROR_FORMAT,
@@ -621,7 +621,7 @@ static void long_files_are_read_in_pieces(void **state) {
                                      i % 7, endings[ending]);
         assert_true(used > 2 * 1024 * 1024);
         ovoid_molecule *molecule = expect_atoms("long.xyzr", file, used, atoms);
-        assert_int_equal(ovoid_molecule_read_counts(molecule).lines, atoms);
+        assert_int_equal(ovoid_molecule_read_counts(molecule)->lines, atoms);
         for (size_t i = 0; i < atoms; i++)
             expect_atom(molecule, i, (double)i + 0.5, (double)(i % 1000), (double)(i % 7), 1.25);
         ovoid_molecule_destroy(&molecule);
@@ -883,7 +883,7 @@ static void molecules_are_made_from_arrays(void **state) {
     assert_int_equal(ovoid_molecule_create(context, xyzr, 3, &molecule), OVOID_OK);
     xyzr[4] = 99; /* a copy was taken */
     expect_atom(molecule, 1, -4, 5, 6, 0);
-    ovoid_molecule_counts counts = ovoid_molecule_read_counts(molecule);
+    ovoid_molecule_counts counts = *ovoid_molecule_read_counts(molecule);
     assert_int_equal(counts.atoms, 3);
     assert_int_equal(counts.zero_radius, 1);
     assert_int_equal(counts.lines, 0);
@@ -1052,7 +1052,7 @@ static void read_known_file(const char *where, const known_file *known) {
     ovoid_molecule *molecule = NULL;
     if (ovoid_molecule_read(context, path, OVOID_MOLECULE_AUTO, &molecule) != OVOID_OK)
         fail_msg("%s", ovoid_context_error(context));
-    ovoid_molecule_counts counts = ovoid_molecule_read_counts(molecule);
+    ovoid_molecule_counts counts = *ovoid_molecule_read_counts(molecule);
     if (counts.atoms != known->atoms || counts.zero_radius != known->zero_radius || counts.skipped)
         fail_msg("%s: %zu atoms, %zu of radius 0", path, (size_t)counts.atoms,
                  (size_t)counts.zero_radius);
@@ -1067,7 +1067,7 @@ static void read_known_structure(const char *where, const known_file *known) {
     ovoid_molecule *molecule = NULL;
     if (ovoid_molecule_read(context, path, OVOID_MOLECULE_AUTO, &molecule) != OVOID_OK)
         fail_msg("%s", ovoid_context_error(context));
-    const ovoid_molecule_counts counts = ovoid_molecule_read_counts(molecule);
+    const ovoid_molecule_counts counts = *ovoid_molecule_read_counts(molecule);
     if (counts.atoms != known->atoms || counts.skipped != known->fused || counts.guessed_radii ||
         counts.zero_radius != known->zero_radius)
         fail_msg("%s: %zu atoms, %zu skipped, %zu guessed", path, (size_t)counts.atoms,

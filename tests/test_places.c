@@ -71,7 +71,7 @@ typedef struct line {
 
 static void line_create(ovoid_context *context, line *l) {
     memset(l, 0, sizeof *l);
-    ovoid_fit_options_init(&l->options);
+    ovoid_fit_options_init(&l->options, sizeof l->options);
     for (size_t i = 0; i < ATOMS; ++i) {
         l->xyzr[4 * i] = 1.4 * (double)i;
         l->xyzr[4 * i + 3] = 1.5 + 0.01 * (double)i;

@@ -94,20 +94,27 @@ static void show(ovoid_progress progress, const char *wanted) {
 }
 
 static ovoid_progress sample(uint64_t points) {
-    return (ovoid_progress){.stage = "sample", .points = points, .ellipsoids = 100};
+    return (ovoid_progress){
+        .stage = "sample", .iterations = OVOID_UNKNOWN, .points = points, .ellipsoids = 100};
 }
 
 static ovoid_progress adaptive(const char *stage, uint64_t step) {
-    return (ovoid_progress){.stage = stage, .iteration = step, .ellipsoids = 30, .seconds = 1.9};
+    return (ovoid_progress){.stage = stage,
+                            .method = OVOID_METHOD_ADAPTIVE,
+                            .iteration = step,
+                            .iterations = OVOID_UNKNOWN,
+                            .ellipsoids = 30,
+                            .seconds = 1.9};
 }
 
 /* One of 112 iterations of method l1. */
 static ovoid_progress l1(const char *stage, uint64_t iteration, double seconds) {
     return (ovoid_progress){.stage = stage,
+                            .method = OVOID_METHOD_L1,
                             .iteration = iteration,
                             .iterations = 112,
                             .ellipsoids = 30,
-                            .max_error = 0.25,
+                            .l1.max_error = 0.25,
                             .seconds = seconds};
 }
 
@@ -152,7 +159,11 @@ static void each_level_begins_at_once(void **state) {
 }
 
 static ovoid_progress part(const char *stage, uint64_t done, uint64_t total, double seconds) {
-    return (ovoid_progress){.stage = stage, .done = done, .total = total, .seconds = seconds};
+    return (ovoid_progress){.stage = stage,
+                            .method = OVOID_NO_METHOD,
+                            .done = done,
+                            .total = total ? total : OVOID_UNKNOWN,
+                            .seconds = seconds};
 }
 
 /* What is no fit shows its share, and nothing where it is done at once. */
@@ -184,7 +195,11 @@ static void what_was_erased_returns(void **state) {
 static void time_left_is_that_of_iterations(void **state) {
     (void)state;
     start(false, NULL);
-    show((ovoid_progress){.stage = "sample", .iterations = 112, .points = 10, .seconds = 50.0},
+    show((ovoid_progress){.stage = "sample",
+                          .method = OVOID_METHOD_L1,
+                          .iterations = 112,
+                          .points = 10,
+                          .seconds = 50.0},
          "\rsample  10 points  50 s\033[K");
     show(l1("sparse", 1, 60.0),
          "\rsparse  1/112  30 ellipsoids  error 0.250  [....................]\033[K");

@@ -302,7 +302,7 @@ static void protein_is_hit_where_phi_is_c(void **state) {
     ovoid_molecule *molecule = NULL;
     ovoid_picture_options options;
     test_check(*state, ovoid_molecule_read(*state, path, OVOID_MOLECULE_AUTO, &molecule));
-    ovoid_picture_options_init(&options);
+    ovoid_picture_options_init(&options, sizeof options);
     const size_t atoms = ovoid_molecule_atoms(molecule);
     ov_quadric *const world = test_alloc(atoms, sizeof *world), *const seen =
                                                                     test_alloc(atoms, sizeof *seen);
@@ -371,7 +371,7 @@ static void camera_looks_along_principal_axes(void **state) {
             q[k] = 50.0 + p[0] * r[0][k] + p[1] * r[1][k] + p[2] * r[2][k];
         atoms[i] = atom(q[0], q[1], q[2], 1.5, 0.5);
     }
-    ovoid_picture_options_init(&options);
+    ovoid_picture_options_init(&options, sizeof options);
     ov_camera_aim(&camera, atoms, 200, &options);
     assert_true(fabs(product(camera.axis[0], r[0])) > 0.99);
     assert_true(fabs(product(camera.axis[1], r[1])) > 0.99);
@@ -403,7 +403,7 @@ static void rotation_turns_the_molecule(void **state) {
     const ov_quadric two[] = {atom(-9.0, 0.0, 0.0, 1.0, 0.5), atom(9.0, 0.0, 0.0, 1.0, 0.5)};
     ovoid_picture_options options;
     ov_camera camera;
-    ovoid_picture_options_init(&options);
+    ovoid_picture_options_init(&options, sizeof options);
     options.direction[2] = 1.0;
     ov_camera_aim(&camera, two, 2, &options);
     expect_near(ov_camera_see(&camera, &two[1]).centre[0], 9.0, 1e-9, "x");
@@ -423,7 +423,7 @@ static void quadrics_keep_their_values(void **state) {
     ovoid_picture_options options;
     ov_camera camera;
     see_model(&random, MODEL_RANDOM, 4.0, quadrics, 20);
-    ovoid_picture_options_init(&options);
+    ovoid_picture_options_init(&options, sizeof options);
     options.rotation[0] = 0.7;
     ov_camera_aim(&camera, quadrics, 20, &options);
     camera.centre[0] = 3.0;
@@ -458,7 +458,7 @@ static ovoid_model *make_sphere_model(ovoid_context *context, double x, double a
 
 static ovoid_picture_options small_picture(uint32_t width, uint32_t height) {
     ovoid_picture_options options;
-    ovoid_picture_options_init(&options);
+    ovoid_picture_options_init(&options, sizeof options);
     options.width = width;
     options.height = height;
     options.samples = 1;

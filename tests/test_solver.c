@@ -55,7 +55,7 @@ static void twin_is_the_derivative(void **state) {
 
 /* What solve_start takes and leaves, `count` ellipsoids. */
 typedef struct start {
-    size_t count;
+    size_t count, group;   /* ellipsoids, in all and of a work-group */
     double *x;             /* parameters */
     float *gram, *moments; /* given */
     float *block, *diagonal, *step, *r, *p, *polynomial, *rz;
@@ -66,7 +66,10 @@ static void run_start(ovoid_context *context, start *s, float lambda) {
     ov_buffer factor = {0}, gram = {0}, moments = {0}, block = {0}, diagonal = {0}, x = {0},
               r = {0}, p = {0}, polynomial = {0}, rz = {0};
     const cl_uint count = (cl_uint)s->count;
-    const size_t groups = (s->count + OV_SOLVE_GROUP - 1) / OV_SOLVE_GROUP;
+    ov_device *device;
+    test_check(context, ov_device_get(context, &device));
+    s->group = device->solve_group;
+    const size_t groups = (s->count + s->group - 1) / s->group;
     float *const l = test_alloc(6 * s->count, sizeof *l);
     for (size_t i = 0; i < s->count; ++i)
         for (size_t k = 0; k < 6; ++k)
@@ -80,8 +83,8 @@ static void run_start(ovoid_context *context, start *s, float lambda) {
         test_check(context, ov_buffer_reserve(context, vectors[k], s->count * P * 4, "vector"));
     test_check(context, ov_buffer_reserve(context, &block, s->count * BLOCK * 4, "blocks"));
     test_check(context, ov_buffer_reserve(context, &rz, groups * 4, "sums"));
-    test_check(context, OV_LAUNCH(context, &kernel, count, OV_SOLVE_GROUP, OV_ARG(count),
-                                  OV_ARG(lambda), OV_ARG(factor.memory), OV_ARG(gram.memory),
+    test_check(context, OV_LAUNCH(context, &kernel, count, s->group, OV_ARG(count), OV_ARG(lambda),
+                                  OV_ARG(factor.memory), OV_ARG(gram.memory),
                                   OV_ARG(moments.memory), OV_ARG(block.memory),
                                   OV_ARG(diagonal.memory), OV_ARG(x.memory), OV_ARG(r.memory),
                                   OV_ARG(p.memory), OV_ARG(polynomial.memory), OV_ARG(rz.memory)));
@@ -205,7 +208,7 @@ static void blocks_equal_twin(void **state) {
     double worst = 0.0;
     make_start(&random, test_size(100, 33), &s);
     run_start(*state, &s, (float)lambda);
-    double rz[8] = {0.0};
+    double *const rz = test_alloc(s.count, sizeof *rz);
     for (size_t i = 0; i < s.count; ++i) {
         const float *const rows = s.block + i * BLOCK;
         double wanted[P][P], lower[P][P] = {{0.0}};
@@ -228,13 +231,14 @@ static void blocks_equal_twin(void **state) {
             expect_near(product, r, 3e-5 * scale, "block p");
             const double diagonal = wanted[j][j] / (1.0 + lambda);
             expect_near(s.diagonal[i * P + (size_t)j], diagonal, 1e-5 * diagonal, "D");
-            rz[i / OV_SOLVE_GROUP] += (double)r * s.p[i * P + (size_t)j];
+            rz[i / s.group] += (double)r * s.p[i * P + (size_t)j];
         }
     }
     print_message("blocks: %.1e of their diagonals\n", worst);
     assert_true(worst < 1e-5);
-    for (size_t group = 0; group * OV_SOLVE_GROUP < s.count; ++group)
+    for (size_t group = 0; group * s.group < s.count; ++group)
         expect_near(s.rz[group], rz[group], 1e-5 * rz[group], "r . z");
+    free(rz);
     destroy_start(&s);
 }
 
@@ -370,6 +374,49 @@ static void more_than_one_group(void **state) {
                         test_size(3, 30) * 1e-5);
 }
 
+/* One group that does the rest of an iteration, and many: the same but for the order of sums. */
+static void alone_equals_together(void **state) {
+    test_skip_simulated(*state);
+    const size_t counts[] = {1, 40, OV_SOLVE_WIDE + 44};
+    for (size_t n = 0; n < sizeof counts / sizeof *counts; ++n) {
+        problem p;
+        ov_solver alone = {0}, together = {.apart = true};
+        create_problem(&p, *state, counts[n], 4 * counts[n] + 60, 0, 30 + n);
+        double *const one = solve(&p, &alone, 0.3, 4, 0.0);
+        double *const many = solve(&p, &together, 0.3, 4, 0.0);
+        double largest = 0.0, off = 0.0;
+        for (size_t j = 0; j < counts[n] * P; ++j) {
+            largest = fmax(largest, fabs(many[j]));
+            off = fmax(off, fabs(one[j] - many[j]));
+        }
+        print_message("%zu ellipsoids: off by %.1e of %.1e\n", counts[n], off, largest);
+        assert_true(largest > 0.0 && off < 1e-4 * largest);
+        free(one);
+        free(many);
+        ov_solver_destroy(&alone);
+        ov_solver_destroy(&together);
+        destroy_problem(&p);
+    }
+}
+
+/* Nothing is waited for but the step; an iteration takes three launches. */
+static void nothing_is_waited_for(void **state) {
+    test_skip_simulated(*state);
+    problem p;
+    ov_solver solver = {0};
+    create_problem(&p, *state, 20, 300, 0, 11);
+    free(solve(&p, &solver, 0.1, 1, 0.0));
+    const ov_device *const device = p.b.context->device;
+    const uint64_t reads = device->counts[OVOID_COUNT_BLOCKING_READS],
+                   launches = device->counts[OVOID_COUNT_LAUNCHES];
+    free(solve(&p, &solver, 0.1, 25, 0.0));
+    assert_int_equal(device->counts[OVOID_COUNT_BLOCKING_READS] - reads, 1);
+    assert_int_equal(device->counts[OVOID_COUNT_LAUNCHES] - launches,
+                     2 + 1 + 25 * 3); /* moments, gram, start */
+    ov_solver_destroy(&solver);
+    destroy_problem(&p);
+}
+
 /* Ellipsoids that reach no point stay still, and do not hinder the others; even undamped. */
 static void ellipsoids_without_points(void **state) {
     expect_solution(*state, test_size(4, 2), test_size(400, 60), 1, 0.1, 100, 1e-5);
@@ -466,6 +513,8 @@ int main(void) {
         cmocka_unit_test(several_ellipsoids),
         cmocka_unit_test(one_ellipsoid_takes_one_iteration),
         cmocka_unit_test(more_than_one_group),
+        cmocka_unit_test(alone_equals_together),
+        cmocka_unit_test(nothing_is_waited_for),
         cmocka_unit_test(ellipsoids_without_points),
         cmocka_unit_test(no_residual_no_step),
         cmocka_unit_test(solutions_repeat),

@@ -7,7 +7,7 @@
 #include "scratch.h"
 #include "support.h"
 
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 enum { ATOMS = 12, POINTS = 40 };
 
@@ -57,7 +57,7 @@ static ovoid_status read_model(void) {
 
 static ovoid_status fit(ovoid_method method) {
     ovoid_fit_options options;
-    ovoid_fit_options_init(&options);
+    ovoid_fit_options_init(&options, sizeof options);
     options.method = method;
     options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
     options.adaptive.ellipsoids = 4;
@@ -81,14 +81,14 @@ static ovoid_status fit_l1(void) {
 
 static ovoid_status mesh_molecule(void) {
     ovoid_mesh_options options;
-    ovoid_mesh_options_init(&options);
+    ovoid_mesh_options_init(&options, sizeof options);
     MAKES(ovoid_mesh, m, ovoid_mesh_destroy,
           ovoid_molecule_mesh(s.context, s.molecule, 0.5, &options, &m));
 }
 
 static ovoid_status mesh_model(void) {
     ovoid_mesh_options options;
-    ovoid_mesh_options_init(&options);
+    ovoid_mesh_options_init(&options, sizeof options);
     MAKES(ovoid_mesh, m, ovoid_mesh_destroy, ovoid_model_mesh(s.context, s.model, &options, &m));
 }
 
@@ -122,8 +122,9 @@ static ovoid_status measure(void) {
     ovoid_measure_options options;
     ovoid_measures before, after;
     memset(&before, 0x5a, sizeof before);
+    before.size = sizeof before;
     memcpy(&after, &before, sizeof after);
-    ovoid_measure_options_init(&options);
+    ovoid_measure_options_init(&options, sizeof options);
     const ovoid_status status = ovoid_measure(s.context, s.molecule, s.model, &options, &after);
     UNTOUCHED(before, after);
 }
@@ -154,7 +155,7 @@ static ovoid_status model_field(void) {
 
 static ovoid_status render(ovoid_view view) {
     ovoid_picture_options options;
-    ovoid_picture_options_init(&options);
+    ovoid_picture_options_init(&options, sizeof options);
     options.view = view;
     options.width = 60;
     options.height = 30;
@@ -198,13 +199,13 @@ static ovoid_status put_image(const char *path) {
 }
 static ovoid_status export_model(const char *path) {
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = 1.0;
     return ovoid_model_export(s.context, s.model, path, &options);
 }
 static ovoid_status export_molecule(const char *path) {
     ovoid_export_options options;
-    ovoid_export_options_init(&options);
+    ovoid_export_options_init(&options, sizeof options);
     options.spacing = 1.0;
     return ovoid_molecule_export(s.context, s.molecule, 0.5, path, &options);
 }
@@ -279,7 +280,7 @@ static bool watch(const ovoid_progress *progress, void *user) {
     ++w->asked;
     assert_true(w->stop_at == 0 || w->asked <= w->stop_at); /* nobody is asked again */
     assert_true(progress->seconds >= w->seconds);
-    assert_true(progress->total == 0 || progress->done <= progress->total);
+    assert_true(progress->total == OVOID_UNKNOWN || progress->done <= progress->total);
     w->seconds = progress->seconds;
     if (!strstr(w->stages, progress->stage)) {
         strcat(w->stages, progress->stage);
@@ -339,9 +340,9 @@ static int make_subject(void **state) {
         const double atom[4] = {3.0 * cos(i), 3.0 * sin(i), 0.8 * i, 1.5};
         memcpy(xyzr + 4 * i, atom, sizeof atom);
     }
-    ovoid_mesh_options_init(&meshing);
-    ovoid_fit_options_init(&fitting);
-    ovoid_picture_options_init(&picture);
+    ovoid_mesh_options_init(&meshing, sizeof meshing);
+    ovoid_fit_options_init(&fitting, sizeof fitting);
+    ovoid_picture_options_init(&picture, sizeof picture);
     picture.width = picture.height = 20;
     fitting.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
     fitting.adaptive.ellipsoids = 4;

@@ -301,7 +301,7 @@ static void measure_fas2(ovoid_context *context, const double *xyzr, size_t heav
     ovoid_molecule *molecule = NULL;
     ovoid_model *model = NULL;
     ovoid_measure_options options;
-    ovoid_measure_options_init(&options);
+    ovoid_measure_options_init(&options, sizeof options);
     options.distances = false;
     test_check(context, ovoid_molecule_create(context, xyzr, heavy, &molecule));
     test_check(context, ovoid_model_create(context, all, count, 0.5, 1.0, &model));
@@ -335,6 +335,7 @@ static void test_surface_of_a_protein(void **state) {
                          OV_UNITED_ATOM);
     }
     ovoid_measures got;
+    ovoid_measures_init(&got, sizeof got);
     measure_fas2(context, united, heavy, all, count, &got);
     print_message("area %.1f of %.1f, volume %.1f of %.1f\n", got.area.original, got.area.sparse,
                   got.volume.original, got.volume.sparse);

@@ -500,7 +500,7 @@ static ovoid_mesh *mesh_touching(size_t k) {
     ovoid_molecule *molecule = NULL;
     ovoid_mesh *made = NULL;
     ovoid_mesh_options options;
-    ovoid_mesh_options_init(&options);
+    ovoid_mesh_options_init(&options, sizeof options);
     options.spacing = touching[k].spacing;
     options.vertices = touching[k].vertices;
     test_check(context, ovoid_molecule_create(context, xyzr, 1, &molecule));

@@ -5,12 +5,15 @@
 #include <string.h>
 #include <time.h>
 
-#ifndef OVOID_VERSION
-#error "OVOID_VERSION comes from the build"
-#endif
+#define TEXT_OF(number) #number
+#define TEXT(number) TEXT_OF(number)
 
 const char *ovoid_version(void) {
-    return OVOID_VERSION;
+    return TEXT(OVOID_VERSION_MAJOR) "." TEXT(OVOID_VERSION_MINOR) "." TEXT(OVOID_VERSION_PATCH);
+}
+
+uint32_t ovoid_abi(void) {
+    return OVOID_ABI;
 }
 
 const char *ovoid_status_name(ovoid_status status) {
@@ -51,7 +54,7 @@ static void drop_error(ovoid_context *context) {
 }
 
 void ovoid_context_destroy(ovoid_context **context) {
-    if (!context || !*context)
+    if (!context || !*context || (*context)->calling)
         return;
     if ((*context)->close_device)
         (*context)->close_device(*context);
@@ -149,7 +152,9 @@ void ov_warn(ovoid_context *context, const char *format, ...) {
     va_start(args, format);
     char *text = format_text(format, args);
     va_end(args);
+    ++context->calling;
     context->warn(text ? text : out_of_memory, context->warn_user);
+    --context->calling;
     free(text);
 }
 

@@ -17,7 +17,9 @@ struct ovoid_context {
     void *warn_user;
     ovoid_progress_fn progress; /* base/progress.h */
     void *progress_user;
-    ovoid_progress now;                    /* what it is told, but for the seconds */
+    ovoid_progress now;                    /* what it is told, but for the seconds; 0: unknown */
+    int fitting;                           /* 1 + the method of the fit under way, 0: none */
+    unsigned calling;                      /* callbacks that run, one within the other */
     double began;                          /* the outermost work, in ov_seconds() */
     unsigned works;                        /* public functions at work, one within the other */
     bool profile;                          /* devices begin with their launches counted */
@@ -55,12 +57,15 @@ size_t ov_utf8_length(const unsigned char *text);
 /* Seconds of a monotonic clock. */
 double ov_seconds(void);
 
-/* In a public function: refuses an argument that is NULL, naming
- * both. The context comes first, for there is no telling without it. */
+/* In a public function: refuses an argument that is NULL, naming both, and calls from callbacks of
+ * the same context. The context comes first, for there is no telling without it. */
 #define OV_NEED(context, argument)                                                                 \
     do {                                                                                           \
         if (!(argument))                                                                           \
             return ov_fail(context, OVOID_ERROR_ARGUMENT, "%s: %s is NULL", __func__, #argument);  \
+        if (context->calling)                                                                      \
+            return ov_fail(context, OVOID_ERROR_ARGUMENT,                                          \
+                           "%s: called from a callback of this context", __func__);                \
     } while (0)
 
 /* Runs `expression` (an ovoid_status) and jumps to `cleanup` unless it is OVOID_OK; needs a local

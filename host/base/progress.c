@@ -1,5 +1,7 @@
 #include "base/progress.h"
 
+#include <math.h>
+
 void ovoid_context_on_progress(ovoid_context *context, ovoid_progress_fn fn, void *user) {
     if (!context)
         return;
@@ -16,6 +18,7 @@ void ov_progress_begin(ovoid_context *context, const char *stage) {
         return;
     if (context->works++ == 0) {
         context->now = (ovoid_progress){0};
+        context->fitting = 0;
         context->began = ov_seconds();
     }
     ov_progress_stage(context, stage);
@@ -35,13 +38,36 @@ const char *ov_progress_stage(ovoid_context *context, const char *stage) {
     return before;
 }
 
+void ov_progress_fit(ovoid_context *context, ovoid_method method) {
+    context->fitting = 1 + (int)method;
+}
+
+/* What is unknown is 0 within the library, and has marks of its own in the interface. */
+static void mark_unknown(const ovoid_context *context, ovoid_progress *told) {
+    static const ovoid_l1_progress no_l1 = {NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    told->method = context->fitting - 1;
+    if (told->total == 0)
+        told->total = OVOID_UNKNOWN;
+    if (told->iterations == 0)
+        told->iterations = OVOID_UNKNOWN;
+    if (told->method != OVOID_METHOD_L1 || told->iteration == 0)
+        told->l1 = no_l1;
+    if (told->method != OVOID_METHOD_ADAPTIVE || told->iteration == 0)
+        told->adaptive.misfit = NAN;
+}
+
 static bool ask(ovoid_context *context) {
     if (!context->progress)
         return true;
     ovoid_progress told = context->now; /* a copy: it is the caller's to read, not to change */
+    told.size = sizeof told;
     told.stage = stage_of(context);
     told.seconds = context->works ? ov_seconds() - context->began : 0.0;
-    return context->progress(&told, context->progress_user);
+    mark_unknown(context, &told);
+    ++context->calling;
+    const bool go_on = context->progress(&told, context->progress_user);
+    --context->calling;
+    return go_on;
 }
 
 static ovoid_status stopped(ovoid_context *context) {

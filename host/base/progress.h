@@ -16,6 +16,9 @@
 void ov_progress_begin(ovoid_context *context, const char *stage);
 void ov_progress_end(ovoid_context *context);
 
+/* What began is a fit, by this method. */
+void ov_progress_fit(ovoid_context *context, ovoid_method method);
+
 /* The stage from now on; nothing of it is done. Returns the stage before. */
 const char *ov_progress_stage(ovoid_context *context, const char *stage);
 

@@ -182,7 +182,8 @@ typedef struct cli_profile {
     double began, seconds;    /* of the work, by the host's clock */
     ovoid_kernel_time *times; /* owned */
     size_t count;
-    bool known; /* the work is done, and times hold what it launched */
+    uint64_t counts[OVOID_COUNTS]; /* by ovoid_count: before the work, then what it made of them */
+    bool known;                    /* the work is done, and times hold what it launched */
 } cli_profile;
 
 #define CLI_HELP_PROFILE "print which kernels took the device's time"
@@ -192,13 +193,17 @@ ovoid_status cli_profile_begin(cli_profile *profile, ovoid_context *context);
 ovoid_status cli_profile_end(cli_profile *profile, ovoid_context *context);
 void cli_profile_destroy(cli_profile *profile);
 
-/* A blank line and a table: a row per kernel, all else, and the whole work under its name. Nothing
- * unless known. */
+/* A blank line, a table, with a row per kernel, all else, and the whole work under its name, and a
+ * line of what passed between host and device. Nothing unless known. */
 void cli_profile_print(const cli_profile *profile, const char *whole, FILE *out);
 
 /* The same as `kernels`: an array of objects with name, launches, seconds and share of the whole;
  * null for what the driver does not tell. Nothing unless known. */
 bool cli_profile_report(const cli_profile *profile, cJSON *report);
+
+/* Adds what was counted at the device, under the names of ovoid_fit_profile. counts: by
+ * ovoid_count. */
+bool cli_counts_report(const uint64_t counts[OVOID_COUNTS], cJSON *object);
 
 /* ---- subcommands ---------------------------------------------------------------------------- */
 

@@ -160,7 +160,7 @@ static int list(ovoid_context *context, bool json) {
     bool quiet = false;
     ovoid_context_on_warning(context, cli_on_warning, &quiet);
     cli_watch(context, true);
-    ovoid_status status = ovoid_devices(context, &devices, &count);
+    ovoid_status status = ovoid_devices(context, sizeof(ovoid_device_info), &devices, &count);
     if (status != OVOID_OK)
         return cli_failure(context, status, CLI_INPUT);
     quiet = true; /* opening a device would repeat the warnings */

@@ -53,7 +53,7 @@ typedef struct export_job {
 
 void cli_export_help(FILE *stream) {
     export_numbers defaults = {.decay = OVOID_DEFAULT_DECAY};
-    ovoid_export_options_init(&defaults.options);
+    ovoid_export_options_init(&defaults.options, sizeof defaults.options);
     fputs("Usage: ovoid export INPUT -o FILE [OPTION]...\n"
           "\n"
           "Writes a model for another program, or the field of a model or a molecule as a density\n"
@@ -181,7 +181,7 @@ static bool parse(int argc, char **argv, export_job *job, int *code) {
     memcpy(all, named, sizeof named);
     cli_number_options(numbers, NUMBER_COUNT, NUMBERS, all + NAMED_COUNT);
     job->numbers.decay = OVOID_DEFAULT_DECAY;
-    ovoid_export_options_init(&job->numbers.options);
+    ovoid_export_options_init(&job->numbers.options, sizeof job->numbers.options);
     reading_init(&job->reading, true);
     opterr = 0;
     *code = CLI_USAGE;

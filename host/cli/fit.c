@@ -101,6 +101,7 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
         options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
         options.adaptive.ellipsoids = (uint32_t)(now[-1].result.ellipsoids / 2);
     }
+    ovoid_fit_result_init(&now->result, sizeof now->result);
     ovoid_context_on_progress(job->context, on_progress, job);
     ovoid_status status =
         ovoid_fitter_reach(job->context, job->fitter, &options, &now->model, &now->result);
@@ -184,6 +185,7 @@ static int measure(fit_job *job, fit_level *level) {
     int code = CLI_OK;
     double begin = cli_seconds();
     job->measuring.isovalue = job->options.isovalue;
+    ovoid_measures_init(&level->measures, sizeof level->measures);
     ovoid_status status =
         ovoid_measure(job->context, job->molecule, level->model, &job->measuring, &level->measures);
     level->measured = status == OVOID_OK;
@@ -256,6 +258,7 @@ const char *fit_unreached(const fit_job *job, char text[FIT_REASON_TEXT]) {
     char digits[FIT_DISTANCE_TEXT];
     switch (result->verdict) {
     case OVOID_VERDICT_REACHED:
+    case OVOID_VERDICT_NO_GOAL:
         return NULL;
     case OVOID_VERDICT_NO_SURFACE:
         snprintf(text, FIT_REASON_TEXT,

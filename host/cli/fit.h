@@ -9,9 +9,9 @@
 /* Records every iteration in a CSV file. A trace that cannot be written ends without ending the
  * fit: the model is worth more. */
 typedef struct fit_trace {
-    ovoid_context *context;
-    ovoid_file *file; /* NULL: no trace is kept (any more) */
-    bool failed;      /* and the failure has been reported */
+    ovoid_context *context; /* its own: rows are written in the callbacks of another one */
+    ovoid_file *file;       /* NULL: no trace is kept (any more) */
+    bool failed;            /* and the failure has been reported */
     ovoid_method method;
     size_t level;       /* from 0, being fitted */
     uint64_t iteration; /* the last one recorded of this level, 0 before the first */

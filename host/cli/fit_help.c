@@ -117,8 +117,8 @@ static void print_l1(const ovoid_fit_options *defaults, FILE *stream) {
 void cli_fit_help(FILE *stream) {
     ovoid_fit_options defaults;
     ovoid_measure_options measuring;
-    ovoid_fit_options_init(&defaults);
-    ovoid_measure_options_init(&measuring);
+    ovoid_fit_options_init(&defaults, sizeof defaults);
+    ovoid_measure_options_init(&measuring, sizeof measuring);
     fputs("Usage: ovoid fit MOLECULE... [OPTION]...\n"
           "\n"
           "Fits a sparse model, a few rotated ellipsoid Gaussians, to the Gaussian surface of the\n"

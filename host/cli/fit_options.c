@@ -293,7 +293,7 @@ static bool complete_options(const parser *p) {
     ovoid_l1_options *l1 = &options->l1;
     if (p->iterations && !p->sparse_iterations) {
         ovoid_fit_options defaults;
-        ovoid_fit_options_init(&defaults);
+        ovoid_fit_options_init(&defaults, sizeof defaults);
         l1->sparse_iterations = (uint32_t)((uint64_t)l1->iterations *
                                            defaults.l1.sparse_iterations / defaults.l1.iterations);
     }
@@ -387,8 +387,8 @@ bool fit_options_parse(int argc, char **argv, fit_job *job, int *code) {
     bool good = true;
     int option;
     fill_long_options(all);
-    ovoid_fit_options_init(&job->options);
-    ovoid_measure_options_init(&job->measuring);
+    ovoid_fit_options_init(&job->options, sizeof job->options);
+    ovoid_measure_options_init(&job->measuring, sizeof job->measuring);
     reading_init(&job->reading, false);
     job->measure = true;
     job->level_count = 1;

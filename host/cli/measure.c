@@ -43,7 +43,7 @@ static const cli_number isovalue_number = {
 
 void cli_measure_help(FILE *stream) {
     ovoid_measure_options defaults;
-    ovoid_measure_options_init(&defaults);
+    ovoid_measure_options_init(&defaults, sizeof defaults);
     fputs("Usage: ovoid measure MOLECULE MODEL [OPTION]...\n"
           "\n"
           "Compares the surface of a molecule (PDB, mmCIF, PQR or XYZR, also compressed with\n"
@@ -163,7 +163,7 @@ static bool parse(int argc, char **argv, measure_job *job, int *code) {
                                             {NULL, 0, NULL, 0}};
     bool good = true;
     int option;
-    ovoid_measure_options_init(&job->options);
+    ovoid_measure_options_init(&job->options, sizeof job->options);
     reading_init(&job->reading, false);
     opterr = 0;
     *code = CLI_USAGE;
@@ -237,6 +237,7 @@ static ovoid_status measure_rows(measure_job *job) {
     for (size_t i = 0; i < job->row_count; i++) {
         measure_row *row = &job->rows[i];
         job->options.isovalue = row->isovalue;
+        ovoid_measures_init(&row->measures, sizeof row->measures);
         status =
             ovoid_measure(job->context, job->molecule, job->model, &job->options, &row->measures);
         row->measured = status == OVOID_OK;
@@ -328,7 +329,9 @@ static bool fill_report(cJSON *json, const measure_job *job) {
         if (!good)
             cJSON_Delete(row);
     }
-    return good && cli_profile_report(&job->profile, json);
+    cJSON *counts = good ? cJSON_AddObjectToObject(json, "profile") : NULL;
+    return counts && cli_counts_report(job->profile.counts, counts) &&
+           cli_profile_report(&job->profile, json);
 }
 
 static ovoid_status write_report(const measure_job *job) {

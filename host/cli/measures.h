@@ -8,7 +8,7 @@
 #include "cli.h"
 #include "reading.h"
 
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 /* ---- inputs (source.c) ---------------------------------------------------------------------- */
 

@@ -33,7 +33,7 @@ static const cli_number numbers[] = {
 enum { NUMBER_COUNT = sizeof numbers / sizeof *numbers };
 
 static void set_defaults(mesh_job *job) {
-    ovoid_mesh_options_init(&job->options);
+    ovoid_mesh_options_init(&job->options, sizeof job->options);
     job->decay = OVOID_DEFAULT_DECAY;
 }
 

@@ -103,7 +103,7 @@ static void compose_endless(const ovoid_progress *progress, char *text, size_t w
 /* Of what is no fit: the share of this stage that is done, and for how long all has gone on. */
 static void compose_other(const ovoid_progress *progress, char *text, size_t width) {
     char part[96];
-    if (progress->total > 0) {
+    if (progress->total != OVOID_UNKNOWN) {
         const double share = (double)progress->done / (double)progress->total;
         snprintf(part, sizeof part, "%.0f %%", floor(100.0 * fmin(share, 1.0)));
         append(text, width, part);
@@ -113,7 +113,7 @@ static void compose_other(const ovoid_progress *progress, char *text, size_t wid
 }
 
 static bool is_fit(const ovoid_progress *progress) {
-    return progress->ellipsoids > 0 || progress->points > 0;
+    return progress->method != OVOID_NO_METHOD;
 }
 
 /* Towards a known number of iterations. */
@@ -124,7 +124,7 @@ static void compose_bounded(const ovoid_progress *progress, char *text, size_t w
              (unsigned long long)progress->iterations);
     append(text, width, part);
     append_count(text, width, progress->ellipsoids, "ellipsoids");
-    snprintf(part, sizeof part, "error %.3f", progress->max_error);
+    snprintf(part, sizeof part, "error %.3f", progress->l1.max_error);
     append(text, width, part);
     if (line.pace > 0.0) {
         double left = line.pace * (double)(progress->iterations - progress->iteration);
@@ -147,7 +147,7 @@ static void compose(const ovoid_progress *progress, char *text, size_t width) {
     append(text, width, progress->stage);
     if (!is_fit(progress))
         compose_other(progress, text, width);
-    else if (progress->iterations == 0 || progress->iteration == 0)
+    else if (progress->iterations == OVOID_UNKNOWN || progress->iteration == 0)
         compose_endless(progress, text, width);
     else
         compose_bounded(progress, text, width);

@@ -217,7 +217,7 @@ static void print_radii(const reading *r, FILE *out, const ovoid_molecule *molec
 
 void reading_print(const reading *r, FILE *out, const char *path, const ovoid_molecule *molecule) {
     cli_progress_erase();
-    const ovoid_molecule_counts c = ovoid_molecule_read_counts(molecule);
+    const ovoid_molecule_counts c = *ovoid_molecule_read_counts(molecule);
     fprintf(out, "molecule  %s: %llu atom%s", source_name(path), (count)c.atoms, plural(c.atoms));
     if (c.zero_radius)
         fprintf(out, ", %llu of them of radius 0", (count)c.zero_radius);
@@ -251,7 +251,7 @@ static const char *format_name(const ovoid_molecule *molecule) {
 }
 
 static bool report_counts(cJSON *object, const ovoid_molecule *molecule) {
-    const ovoid_molecule_counts c = ovoid_molecule_read_counts(molecule);
+    const ovoid_molecule_counts c = *ovoid_molecule_read_counts(molecule);
     const struct {
         const char *key;
         uint64_t value;
@@ -300,7 +300,7 @@ static bool report_radii(const reading *r, cJSON *object, const ovoid_molecule *
         (radii != OVOID_RADII_FILE ||
          cli_json_string(object, "radii_file", r->options.radii_file)) &&
         cJSON_AddNumberToObject(object, "guessed_radii",
-                                (double)ovoid_molecule_read_counts(molecule).guessed_radii) &&
+                                (double)ovoid_molecule_read_counts(molecule)->guessed_radii) &&
         (list = cJSON_AddArrayToObject(object, "guessed")) != NULL;
     for (size_t i = 0; i < kinds && good; i++)
         good = report_guess(list, &guesses[i]);

@@ -87,7 +87,7 @@ enum { VIEWS = sizeof view_names / sizeof *view_names };
 
 void cli_render_help(FILE *stream) {
     render_job defaults = {.decay = OVOID_DEFAULT_DECAY};
-    ovoid_picture_options_init(&defaults.options);
+    ovoid_picture_options_init(&defaults.options, sizeof defaults.options);
     fprintf(
         stream,
         "Usage: ovoid render MOLECULE [MODEL] -o FILE.png [OPTION]...\n"
@@ -473,7 +473,7 @@ static int run(render_job *job) {
 int cli_render(int argc, char **argv) {
     render_job job = {.started = cli_seconds(), .decay = OVOID_DEFAULT_DECAY};
     int code;
-    ovoid_picture_options_init(&job.options);
+    ovoid_picture_options_init(&job.options, sizeof job.options);
     if (parse(argc, argv, &job, &code)) {
         if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);

@@ -95,13 +95,13 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
                (double)result->ellipsoids / (double)ovoid_molecule_atoms(job->molecule));
     add_number(b, "points", (double)result->points);
     if (l1) {
-        add_number(b, "rms_error", result->rms_error);
-        add_number(b, "max_error", result->max_error);
+        add_number(b, "rms_error", result->l1.rms_error);
+        add_number(b, "max_error", result->l1.max_error);
     }
     add_number(b, "iterations", (double)result->iterations);
     b->good = b->good && cJSON_AddBoolToObject(b->object, "stopped", level->stopped);
     if (!l1)
-        add_number(b, "solver_iterations", (double)result->solver_iterations);
+        add_number(b, "solver_iterations", (double)result->adaptive.solver_iterations);
     if (level->measured)
         b->good = b->good && measures_report(b->object, &level->measures, &job->measuring);
 }
@@ -144,11 +144,12 @@ static void add_times(builder *b, const fit_job *job) {
     b->good = seconds.good;
 }
 
-/* Of the first level. Methods that do not wait for each part of their work measure none. */
+/* Of the first level. Method adaptive does not wait for each part of its work. */
 static void add_profile(builder *b, const fit_job *job) {
-    const ovoid_fit_profile *spent = &job->levels[0].result.profile;
+    const ovoid_fit_result *result = &job->levels[0].result;
+    const ovoid_l1_result *spent = &result->l1;
     builder profile = add_object(b, "profile");
-    if (spent->field_passes > 0) {
+    if (result->method == OVOID_METHOD_L1) {
         add_seconds(&profile, "lists_seconds", spent->lists_seconds);
         add_seconds(&profile, "field_seconds", spent->field_seconds);
         add_seconds(&profile, "moments_seconds", spent->moments_seconds);
@@ -157,8 +158,7 @@ static void add_profile(builder *b, const fit_job *job) {
         add_number(&profile, "field_passes", (double)spent->field_passes);
         add_number(&profile, "moments_passes", (double)spent->moments_passes);
     }
-    add_number(&profile, "launches", (double)spent->launches);
-    b->good = profile.good;
+    b->good = profile.good && cli_counts_report(result->counts, profile.object);
 }
 
 cJSON *fit_report_make(const fit_job *job) {

@@ -35,7 +35,7 @@ static void print_work(FILE *out, const fit_job *job) {
         fprintf(out,
                 "fit       %llu step%s of refinement, %llu of conjugate gradients, method %s\n",
                 (count)result->iterations, plural(result->iterations),
-                (count)result->solver_iterations, method);
+                (count)result->adaptive.solver_iterations, method);
 }
 
 static void print_stop(FILE *out, const fit_job *job) {
@@ -124,7 +124,7 @@ void fit_summary_after(const fit_job *job) {
             (double)result->ellipsoids / (double)atoms);
     if (l1)
         fprintf(out, "error     rms %.3g, largest %.3g (of the field, over the points)\n",
-                result->rms_error, result->max_error);
+                result->l1.rms_error, result->l1.max_error);
     if (first->measured)
         measures_print(out, &first->measures, &job->measuring);
     if (job->level_count > 1)

@@ -19,11 +19,13 @@ static const char adaptive_header[] = "level,step,ellipsoids,points,objective,se
 ovoid_status fit_trace_open(fit_trace *trace, ovoid_context *context, const char *path,
                             ovoid_method method) {
     const char *header = method == OVOID_METHOD_L1 ? l1_header : adaptive_header;
-    *trace = (fit_trace){.context = context, .method = method};
-    ovoid_status status = ovoid_file_create(context, path, &trace->file);
+    *trace = (fit_trace){.method = method};
+    ovoid_status status = ovoid_context_create(&trace->context);
+    if (status == OVOID_OK)
+        status = ovoid_file_create(context, path, &trace->file);
     if (status != OVOID_OK)
         return status;
-    if (ovoid_file_write(context, trace->file, header, strlen(header)) != OVOID_OK)
+    if (ovoid_file_write(trace->context, trace->file, header, strlen(header)) != OVOID_OK)
         give_up(trace);
     return OVOID_OK;
 }
@@ -41,14 +43,15 @@ void fit_trace_add(fit_trace *trace, const ovoid_progress *p) {
         return;
     trace->iteration = p->iteration;
     if (trace->method == OVOID_METHOD_L1)
-        length = snprintf(row, sizeof row, "%llu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%llu,%.9g,%.6f,%s\n",
-                          (unsigned long long)p->iteration, p->accuracy_term, p->sparse_term,
-                          p->accuracy_weight, p->sparse_weight, p->objective, p->max_error,
-                          (unsigned long long)p->ellipsoids, p->step, p->seconds, p->stage);
+        length =
+            snprintf(row, sizeof row, "%llu,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%llu,%.9g,%.6f,%s\n",
+                     (unsigned long long)p->iteration, p->l1.accuracy_term, p->l1.sparse_term,
+                     p->l1.accuracy_weight, p->l1.sparse_weight, p->l1.objective, p->l1.max_error,
+                     (unsigned long long)p->ellipsoids, p->l1.step, p->seconds, p->stage);
     else
         length = snprintf(row, sizeof row, "%zu,%llu,%llu,%llu,%.9g,%.6f,%s\n", trace->level + 1,
                           (unsigned long long)p->iteration, (unsigned long long)p->ellipsoids,
-                          (unsigned long long)p->points, p->objective, p->seconds, p->stage);
+                          (unsigned long long)p->points, p->adaptive.misfit, p->seconds, p->stage);
     if (ovoid_file_write(trace->context, trace->file, row, (size_t)length) != OVOID_OK)
         give_up(trace);
 }
@@ -62,4 +65,5 @@ void fit_trace_commit(fit_trace *trace) {
 
 void fit_trace_destroy(fit_trace *trace) {
     ovoid_file_destroy(&trace->file);
+    ovoid_context_destroy(&trace->context);
 }

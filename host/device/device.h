@@ -15,15 +15,26 @@
  * of OV_PACK points is handled by `lanes` work-items with vectors of `vector` floats. */
 typedef struct ov_shape {
     uint32_t vector; /* 16, 8, 4 or 1 */
-    uint32_t lanes;  /* work-items that share a pack or an ellipsoid: 1 on CPUs, 32 on GPUs */
+    uint32_t lanes;  /* work-items that share a pack: 1 on CPUs, OV_PACK on GPUs */
 } ov_shape;
 
 /* Environment variables for development and tests:
- *   OVOID_SHAPE       "VxL", such as 1x16 or 4x1, instead of the device's own shape: V one of 1, 4,
- * 8, 16, L a power of two, V * L a divisor of OV_PACK OVOID_KERNEL_DIR  folder with the kernel
- * sources, all of them, instead of the embedded ones OVOID_CACHE       auto (default), on or off:
- * whether compiled programs are kept. auto leaves that to drivers with a cache of their own (PoCL)
- *   OVOID_CACHE_DIR   where they are kept, instead of $XDG_CACHE_HOME/ovoid or ~/.cache/ovoid */
+ *
+ * - OVOID_SHAPE: "VxL", such as 1x16 or 4x1, instead of the device's own shape. V is one of 1, 4,
+ *   8, 16, L a power of two, and V * L a divisor of OV_PACK.
+ *
+ * - OVOID_KERNEL_DIR: the folder with the kernel sources, all of them, instead of the embedded
+ *   ones.
+ *
+ * - OVOID_CACHE: auto (default), on or off: whether compiled programs are kept. auto leaves that to
+ *   drivers with a cache of their own (PoCL).
+ *
+ * - OVOID_CACHE_DIR: where they are kept, instead of $XDG_CACHE_HOME/ovoid or ~/.cache/ovoid.
+ *
+ * - OVOID_POOL: off creates buffers as large as asked for, and releases them at once, for
+ * simulators that look for accesses beyond a buffer's end. */
+
+typedef struct ov_pool ov_pool; /* buffers kept for the next that need one (pool.c) */
 
 typedef struct ov_device {
     ovoid_device_info info;
@@ -32,14 +43,18 @@ typedef struct ov_device {
     cl_context context;
     cl_command_queue queue; /* in order */
     ov_shape shape;
-    size_t max_group;            /* largest work-group */
-    uint64_t launches;           /* kernels enqueued since the device was opened */
-    struct ov_program *programs; /* built so far, a list */
-    uint32_t built;              /* programs compiled from source so far */
-    uint32_t loaded;             /* programs taken from the cache so far */
-    bool cache_told;             /* the user knows that the cache does not work */
-    struct ov_profile *profile;  /* times of kernels; NULL until ovoid_context_profile() */
-    unsigned char *staged;       /* copies of small writes under way; NULL before the first */
+    size_t max_group;              /* largest work-group */
+    uint32_t team;                 /* work-items that share a term, -DOV_TEAM: 1 with one lane */
+    uint32_t solve_group;          /* a work-group of the solver, -DOV_SOLVE_GROUP */
+    uint64_t counts[OVOID_COUNTS]; /* since the device was opened */
+    struct ov_program *programs;   /* built so far, a list */
+    struct ov_made *made;          /* kernels made so far, a list */
+    ov_pool *pool;
+    uint32_t built;             /* programs compiled from source so far */
+    uint32_t loaded;            /* programs taken from the cache so far */
+    bool cache_told;            /* the user knows that the cache does not work */
+    struct ov_profile *profile; /* times of kernels; NULL until ovoid_context_profile() */
+    unsigned char *staged;      /* copies of small writes under way; NULL before the first */
     size_t staged_bytes;
 } ov_device;
 
@@ -49,12 +64,17 @@ ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
 /* Releases programs, queue and device; nothing happens when none is open. */
 void ov_device_close(ovoid_context *context);
 
+/* What the device has counted, less what it had counted `before` (NULL: nothing). */
+void ov_device_counted(const ov_device *device, const uint64_t before[OVOID_COUNTS],
+                       uint64_t counts[OVOID_COUNTS]);
+
 /* A kernel. `name` and `program` are string constants. */
 typedef struct ov_kernel {
     cl_kernel handle;
     const char *program;
     const char *name;
     size_t max_group; /* largest work-group of this kernel */
+    size_t group;     /* the only work-group that it is compiled for; 0: any */
     size_t arg_count;
 } ov_kernel;
 
@@ -62,14 +82,13 @@ typedef struct ov_kernel {
  * the embedded source, or from the folder OVOID_KERNEL_DIR when that is set) and keeping it with
  * the device. On PoCL all embedded files are built as one program: no two kernels, functions or
  * macros of theirs may share a name. Build options: -cl-std=CL1.2, the shape, -DOV_PACK, and never
- * a relaxed-math flag. */
+ * a relaxed-math flag.
+ *
+ * A kernel is made once for a device and kept with it: all that ask for it share the handle, whose
+ * arguments each launch sets anew. Like all of a context, it belongs to one thread at a time. */
 ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const char *name,
                               ov_kernel *kernel);
 void ov_kernel_destroy(ov_kernel *kernel);
-
-/* `wanted` work-items in a group, or as many as the kernel can have: for kernels whose work-items
- * share nothing. */
-size_t ov_kernel_group(const ov_kernel *kernel, size_t wanted);
 
 /* One kernel argument: a value of `size` bytes. OV_ARG takes an lvalue (a cl_mem, a scalar). */
 typedef struct ov_arg {
@@ -80,8 +99,10 @@ typedef struct ov_arg {
 #define OV_LOCAL(bytes) ((ov_arg){(bytes), NULL})
 
 /* Sets all arguments and enqueues a one-dimensional launch of at least `global` work-items in
- * groups of `local` (0: the driver chooses; otherwise global is rounded up to a multiple, so
- * kernels check their bounds). Does not wait. global == 0 does nothing. */
+ * groups of `local`, or of fewer where the device cannot run so many of this kernel (0: the driver
+ * chooses; otherwise global is rounded up to a multiple, so kernels check their bounds). A kernel
+ * whose work-items share memory is compiled for its group (reqd_work_group_size), and launched with
+ * that alone. Does not wait. global == 0 does nothing. */
 ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t global, size_t local,
                        const ov_arg *args, size_t arg_count);
 #define OV_LAUNCH(context, kernel, global, local, ...)                                             \
@@ -91,11 +112,13 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
 /* A device buffer that remembers its size. {0} is an empty one. */
 typedef struct ov_buffer {
     cl_mem memory;
-    size_t bytes; /* allocated */
+    size_t bytes;  /* allocated */
+    ov_pool *pool; /* where it goes when it is destroyed */
 } ov_buffer;
 
 /* Makes the buffer at least `bytes` large (never zero), growing geometrically; contents are lost
- * when it grows. `what` names it in errors. Beyond the device's max_allocation: OVOID_ERROR_LIMIT.
+ * when it grows, and what a new one holds is arbitrary. `what` names it in errors. Beyond the
+ * device's max_allocation: OVOID_ERROR_LIMIT.
  */
 ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t bytes,
                                const char *what);
@@ -110,6 +133,16 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
 /* ov_buffer_reserve() and ov_buffer_write() in one. */
 ovoid_status ov_buffer_put(ovoid_context *context, ov_buffer *buffer, const void *data,
                            size_t bytes, const char *what);
+
+/* A read that is waited for later, so that the device has something to do meanwhile: `data` is to
+ * stay until ov_later_end(), which has to follow, after failures too. {0} is none. */
+typedef struct ov_later {
+    cl_event event;
+} ov_later;
+ovoid_status ov_buffer_read_later(ovoid_context *context, const ov_buffer *buffer, size_t offset,
+                                  void *data, size_t bytes, ov_later *later);
+/* Waits for the read, but not for what was enqueued after it; at once where there is none. */
+ovoid_status ov_later_end(ovoid_context *context, ov_later *later);
 
 /* Waits until everything enqueued has run. */
 ovoid_status ov_finish(ovoid_context *context);

@@ -1,5 +1,7 @@
 #include "device/internal.h"
 
+#include "base/sized.h"
+
 #include <ctype.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -138,7 +140,7 @@ typedef struct list {
 
 static ovoid_status add_device(ovoid_context *context, list *all, cl_platform_id platform,
                                const char *platform_name, cl_device_id id) {
-    ov_device_entry entry = {.platform = platform, .id = id};
+    ov_device_entry entry = {.platform = platform, .id = id, .info.size = sizeof entry.info};
     cl_int code = describe(&entry);
     if (code != CL_SUCCESS) {
         ov_warn(context, "a device of OpenCL platform %s is left out: clGetDeviceInfo: %s (%d)",
@@ -225,25 +227,27 @@ cleanup:
     return status;
 }
 
-ovoid_status ovoid_devices(ovoid_context *context, ovoid_device_info **devices, size_t *count) {
+ovoid_status ovoid_devices(ovoid_context *context, size_t size, ovoid_device_info **devices,
+                           size_t *count) {
     ovoid_status status = OVOID_OK;
     ov_device_entry *entries = NULL;
-    ovoid_device_info *infos = NULL;
+    char *infos = NULL;
     size_t found = 0, platforms = 0;
     OV_NEED(context, context);
     OV_NEED(context, devices);
     OV_NEED(context, count);
+    OV_TRY(ov_sized_check(context, "ovoid_device_info", &size));
     OV_TRY(ov_devices_list(context, &entries, &found, &platforms));
     if (found) {
-        infos = ov_alloc(context, found, sizeof *infos, "the list of devices");
+        infos = ov_alloc(context, found, size, "the list of devices");
         if (!infos) {
             status = OVOID_ERROR_MEMORY;
             goto cleanup;
         }
         for (size_t i = 0; i < found; i++)
-            infos[i] = entries[i].info;
+            ov_sized_init(infos + i * size, size, &entries[i].info, sizeof entries[i].info);
     }
-    *devices = infos;
+    *devices = (ovoid_device_info *)(void *)infos;
     *count = found;
 cleanup:
     free(entries);

@@ -76,6 +76,34 @@ bool ov_private_folder(const char *base, char *path, size_t size);
 /* Creates a folder and those above it, mode 0700 each. False with errno when that fails. */
 bool ov_make_folders(const char *path);
 
+/* ---- pool --------------------------------------------------------------------------------- */
+
+/* Buffers kept for the next that need one (pool.c). Those in use hold on to the pool, and are
+ * released for good once the device is gone. */
+
+/* NULL with an error where there is no room. memory: the device's, bytes. OVOID_POOL=off makes a
+ * pool that keeps nothing. */
+ov_pool *ov_pool_create(ovoid_context *context, uint64_t memory);
+
+/* Releases what is kept; the device is gone. pool may be NULL. */
+void ov_pool_close(ov_pool *pool);
+
+/* Releases what is kept, for its memory to serve others; whether there was any. */
+bool ov_pool_empty(ov_pool *pool);
+
+/* The size that a buffer of so many bytes is to have, for others to fit into it later. */
+size_t ov_pool_size(const ov_pool *pool, size_t bytes);
+
+/* Finds a kept buffer of at least so many bytes and not many more; false: there is none. */
+bool ov_pool_take(ov_pool *pool, size_t bytes, ov_buffer *buffer);
+
+/* Makes a buffer of new memory. */
+void ov_pool_own(ov_pool *pool, cl_mem memory, size_t bytes, ov_buffer *buffer);
+
+/* Takes a buffer back, which is not to be used any more. The queue is in order: what still works on
+ * it ends before whatever the next owner asks for. */
+void ov_pool_put(ov_buffer *buffer);
+
 /* ---- profile ------------------------------------------------------------------------------ */
 
 /* What ovoid_context_profile() asks for. Each launch leaves an event; events are read where the
@@ -109,7 +137,7 @@ typedef struct ov_source {
 /* The embedded kernel sources, ended by a NULL name; made by cmake/EmbedKernels.cmake. */
 extern const ov_source ov_sources[];
 
-/* Releases all programs of the device. */
+/* Releases all programs of the device, and their kernels. */
 void ov_programs_release(ov_device *device);
 
 /* The cache of compiled programs: one file <program>-<hash of key>.bin each, which holds the whole

@@ -7,25 +7,27 @@
 
 /* ---- launches ----------------------------------------------------------------------------- */
 
-size_t ov_kernel_group(const ov_kernel *kernel, size_t wanted) {
-    return wanted < kernel->max_group ? wanted : kernel->max_group;
-}
-
 static ovoid_status check_launch(ovoid_context *context, const ov_kernel *kernel, size_t global,
                                  size_t local, size_t arg_count) {
     if (arg_count != kernel->arg_count)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "kernel %s of %s.cl takes %zu arguments, %zu were given", kernel->name,
                        kernel->program, kernel->arg_count, arg_count);
-    if (local > kernel->max_group)
-        return ov_fail(context, OVOID_ERROR_LIMIT,
-                       "kernel %s runs in groups of at most %zu work-items on %s, %zu were asked "
-                       "for",
-                       kernel->name, kernel->max_group, context->device->info.name, local);
+    if (kernel->group && local != kernel->group)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "kernel %s is compiled for groups of %zu work-items, launched with %zu",
+                       kernel->name, kernel->group, local);
     if (local && global > SIZE_MAX - (local - 1))
         return ov_fail(context, OVOID_ERROR_LIMIT, "kernel %s: %zu work-items are too many",
                        kernel->name, global);
     return OVOID_OK;
+}
+
+/* Drivers that give a buffer its memory when it is first used find out only then that there is
+ * none left. Buffers that are kept are released for its sake; true: it is worth another try. */
+static bool made_room(ov_device *device, cl_int code) {
+    return code == CL_MEM_OBJECT_ALLOCATION_FAILURE && ov_pool_empty(device->pool) &&
+           clFinish(device->queue) == CL_SUCCESS;
 }
 
 ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t global, size_t local,
@@ -34,6 +36,8 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
         return OVOID_OK;
     if (!context->device || !kernel->handle)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "a kernel was launched before it was made");
+    if (local > kernel->max_group)
+        local = kernel->max_group;
     ovoid_status status = check_launch(context, kernel, global, local, arg_count);
     if (status == OVOID_OK)
         status = ov_progress_ask(context);
@@ -53,11 +57,14 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     if ((status = ov_profile_prepare(context, context->device, &timed)) != OVOID_OK)
         return status;
     cl_event event = NULL;
-    cl_int code = clEnqueueNDRangeKernel(context->device->queue, kernel->handle, 1, NULL, &global,
-                                         local ? &local : NULL, 0, NULL, timed ? &event : NULL);
+    cl_int code;
+    do
+        code = clEnqueueNDRangeKernel(context->device->queue, kernel->handle, 1, NULL, &global,
+                                      local ? &local : NULL, 0, NULL, timed ? &event : NULL);
+    while (made_room(context->device, code));
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueNDRangeKernel", kernel->name);
-    context->device->launches++;
+    context->device->counts[OVOID_COUNT_LAUNCHES]++;
     ov_profile_add(context->device, kernel->name, event);
     return OVOID_OK;
 }
@@ -82,9 +89,13 @@ ovoid_status ov_finish(ovoid_context *context) {
 static cl_int allocate(ov_device *device, ov_buffer *buffer, size_t bytes) {
     cl_int code;
     cl_mem memory = clCreateBuffer(device->context, CL_MEM_READ_WRITE, bytes, NULL, &code);
-    if (code == CL_SUCCESS)
-        *buffer = (ov_buffer){memory, bytes};
-    return code;
+    if (code != CL_SUCCESS && ov_pool_empty(device->pool) && clFinish(device->queue) == CL_SUCCESS)
+        memory = clCreateBuffer(device->context, CL_MEM_READ_WRITE, bytes, NULL, &code);
+    if (code != CL_SUCCESS)
+        return code;
+    ov_pool_own(device->pool, memory, bytes, buffer);
+    device->counts[OVOID_COUNT_BUFFERS_CREATED]++;
+    return CL_SUCCESS;
 }
 
 ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t bytes,
@@ -110,6 +121,10 @@ ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t
     if (room > limit)
         room = bytes ? bytes : 1;
     ov_buffer_destroy(buffer);
+    if (ov_pool_take(device->pool, room, buffer))
+        return OVOID_OK;
+    if (ov_pool_size(device->pool, room) <= limit)
+        room = ov_pool_size(device->pool, room);
     cl_int code = allocate(device, buffer, room);
     if (code != CL_SUCCESS && bytes && room > bytes)
         code = allocate(device, buffer, bytes);
@@ -125,7 +140,7 @@ void ov_buffer_destroy(ov_buffer *buffer) {
     if (!buffer)
         return;
     if (buffer->memory)
-        clReleaseMemObject(buffer->memory);
+        ov_pool_put(buffer);
     *buffer = (ov_buffer){0};
 }
 
@@ -161,11 +176,16 @@ ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t o
     if (status != OVOID_OK)
         return status;
     const void *copy = stage(context->device, data, bytes);
-    cl_int code =
-        clEnqueueWriteBuffer(context->device->queue, buffer->memory, copy ? CL_FALSE : CL_TRUE,
-                             offset, bytes, copy ? copy : data, 0, NULL, NULL);
+    cl_int code;
+    do
+        code =
+            clEnqueueWriteBuffer(context->device->queue, buffer->memory, copy ? CL_FALSE : CL_TRUE,
+                                 offset, bytes, copy ? copy : data, 0, NULL, NULL);
+    while (made_room(context->device, code));
     if (code != CL_SUCCESS)
         return ov_cl_fail(context, code, "clEnqueueWriteBuffer", NULL);
+    context->device->counts[OVOID_COUNT_BYTES_TO_DEVICE] += bytes;
+    context->device->counts[OVOID_COUNT_BLOCKING_WRITES] += !copy;
     return copy ? OVOID_OK : idle(context);
 }
 
@@ -182,8 +202,41 @@ ovoid_status ov_buffer_read(ovoid_context *context, const ov_buffer *buffer, siz
     ovoid_status status = check_range(context, buffer, offset, bytes);
     if (status != OVOID_OK)
         return status;
-    cl_int code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_TRUE, offset,
-                                      bytes, data, 0, NULL, NULL);
-    return code == CL_SUCCESS ? idle(context)
-                              : ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+    cl_int code;
+    do
+        code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_TRUE, offset, bytes,
+                                   data, 0, NULL, NULL);
+    while (made_room(context->device, code));
+    if (code != CL_SUCCESS)
+        return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+    context->device->counts[OVOID_COUNT_BYTES_FROM_DEVICE] += bytes;
+    context->device->counts[OVOID_COUNT_BLOCKING_READS]++;
+    return idle(context);
+}
+
+ovoid_status ov_buffer_read_later(ovoid_context *context, const ov_buffer *buffer, size_t offset,
+                                  void *data, size_t bytes, ov_later *later) {
+    ovoid_status status = check_range(context, buffer, offset, bytes);
+    if (status != OVOID_OK)
+        return status;
+    cl_int code;
+    do
+        code = clEnqueueReadBuffer(context->device->queue, buffer->memory, CL_FALSE, offset, bytes,
+                                   data, 0, NULL, &later->event);
+    while (made_room(context->device, code));
+    if (code != CL_SUCCESS) {
+        later->event = NULL;
+        return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);
+    }
+    context->device->counts[OVOID_COUNT_BYTES_FROM_DEVICE] += bytes;
+    return OVOID_OK;
+}
+
+ovoid_status ov_later_end(ovoid_context *context, ov_later *later) {
+    if (!later->event)
+        return OVOID_OK;
+    const cl_int code = clWaitForEvents(1, &later->event);
+    clReleaseEvent(later->event);
+    later->event = NULL;
+    return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clWaitForEvents", NULL);
 }

@@ -207,12 +207,46 @@ static ovoid_status set_shape(ovoid_context *context, ov_device *device) {
     return OVOID_OK;
 }
 
+/* ---- groups ------------------------------------------------------------------------------- */
+
+/* Work-items that a GPU runs in step, where it says so; 0 where it does not. */
+#ifndef CL_DEVICE_PREFERRED_WORK_GROUP_SIZE_MULTIPLE
+#define CL_DEVICE_PREFERRED_WORK_GROUP_SIZE_MULTIPLE 0x1067 /* OpenCL 3.0 */
+#endif
+#ifndef CL_DEVICE_WAVEFRONT_WIDTH_AMD
+#define CL_DEVICE_WAVEFRONT_WIDTH_AMD 0x4043
+#endif
+static size_t wave_of(const ov_device *device) {
+    size_t multiple = 0;
+    cl_uint width = 0;
+    if (clGetDeviceInfo(device->id, CL_DEVICE_WAVEFRONT_WIDTH_AMD, sizeof width, &width, NULL) ==
+        CL_SUCCESS)
+        return width;
+    if (clGetDeviceInfo(device->id, CL_DEVICE_PREFERRED_WORK_GROUP_SIZE_MULTIPLE, sizeof multiple,
+                        &multiple, NULL) == CL_SUCCESS)
+        return multiple;
+    return 0;
+}
+
+/* Groups whose work-items share memory: a warp, or a wave of 64 where the device has those, or the
+ * most that it runs. Powers of two. */
+#define WARP 32
+#define WAVE 64
+static void set_groups(ov_device *device) {
+    uint32_t group = wave_of(device) >= WAVE ? WAVE : WARP;
+    while (group > 1 && group > device->max_group)
+        group /= 2;
+    device->solve_group = group;
+    device->team = device->shape.lanes == 1 ? 1 : group; /* lanes fit into it: both are powers */
+}
+
 /* ---- opening and closing ------------------------------------------------------------------ */
 
 static void release(ov_device *device) {
     if (!device)
         return;
     ov_programs_release(device);
+    ov_pool_close(device->pool);
     if (device->queue) {
         clFinish(device->queue);
         ov_profile_release(device);
@@ -259,7 +293,12 @@ static ovoid_status make_device(ovoid_context *context, const ov_device_entry *e
         status = ov_cl_fail_on(context, code, call, NULL, name);
         goto cleanup;
     }
+    if (!(device->pool = ov_pool_create(context, device->info.global_memory))) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
     OV_TRY(set_shape(context, device));
+    set_groups(device);
     if (context->profile)
         OV_TRY(ov_profile_start(context, device));
     *made = device;
@@ -292,6 +331,19 @@ cleanup:
 
 const ovoid_device_info *ovoid_context_device(const ovoid_context *context) {
     return context && context->device ? &context->device->info : NULL;
+}
+
+/* ---- counts ------------------------------------------------------------------------------- */
+
+uint64_t ovoid_context_count(const ovoid_context *context, ovoid_count what) {
+    const ov_device *const device = context ? context->device : NULL;
+    return device && (unsigned)what < OVOID_COUNTS ? device->counts[what] : 0;
+}
+
+void ov_device_counted(const ov_device *device, const uint64_t before[OVOID_COUNTS],
+                       uint64_t counts[OVOID_COUNTS]) {
+    for (size_t n = 0; n < OVOID_COUNTS; ++n)
+        counts[n] = device->counts[n] - (before ? before[n] : 0);
 }
 
 ovoid_status ov_device_get(ovoid_context *context, ov_device **device) {

@@ -17,6 +17,12 @@ struct ov_program {
     struct ov_program *next;
 };
 
+/* A kernel that was made. */
+struct ov_made {
+    ov_kernel kernel;
+    struct ov_made *next;
+};
+
 /* ---- sources ------------------------------------------------------------------------------ */
 
 /* Where the kernel sources are instead of in the library, NULL for there. */
@@ -215,9 +221,12 @@ static ovoid_status make_program(ovoid_context *context, ov_device *device, cons
     ovoid_status status = OVOID_OK;
     ov_text source = {0}, key = {0};
     cl_program made = NULL;
-    char options[128];
-    snprintf(options, sizeof options, "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d",
-             (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK);
+    char options[160];
+    snprintf(options, sizeof options,
+             "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d -DOV_TEAM=%u "
+             "-DOV_SOLVE_GROUP=%u",
+             (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK,
+             (unsigned)device->team, (unsigned)device->solve_group);
     OV_TRY(program_source(context, stem, &source));
     bool cache =
         ov_cache_wanted(context, device) && binary_key(device, options, &source, &key) == OVOID_OK;
@@ -285,6 +294,12 @@ static ovoid_status get_program(ovoid_context *context, ov_device *device, const
 }
 
 void ov_programs_release(ov_device *device) {
+    while (device->made) {
+        struct ov_made *made = device->made;
+        device->made = made->next;
+        clReleaseKernel(made->kernel.handle);
+        free(made);
+    }
     while (device->programs) {
         struct ov_program *program = device->programs;
         device->programs = program->next;
@@ -295,36 +310,78 @@ void ov_programs_release(ov_device *device) {
 
 /* ---- kernels ------------------------------------------------------------------------------ */
 
+static ovoid_status fail_create(ovoid_context *context, const ov_kernel *kernel, cl_int code) {
+    return ov_fail(context, OVOID_ERROR_OPENCL,
+                   "clCreateKernel: %s (%d), kernel %s of %s.cl, device %s", ov_cl_name(code),
+                   (int)code, kernel->name, kernel->program, context->device->info.name);
+}
+
+/* Fills in all but the names. */
+static ovoid_status make_kernel(ovoid_context *context, ov_device *device, ov_kernel *kernel) {
+    cl_program handle;
+    cl_int code;
+    cl_uint arg_count = 0;
+    ovoid_status status = get_program(context, device, kernel->program, &handle);
+    if (status != OVOID_OK)
+        return status;
+    kernel->handle = clCreateKernel(handle, kernel->name, &code);
+    if (code != CL_SUCCESS)
+        return fail_create(context, kernel, code);
+    device->counts[OVOID_COUNT_KERNELS_CREATED]++;
+    const char *call = "clGetKernelInfo";
+    code = clGetKernelInfo(kernel->handle, CL_KERNEL_NUM_ARGS, sizeof arg_count, &arg_count, NULL);
+    if (code == CL_SUCCESS) {
+        call = "clGetKernelWorkGroupInfo";
+        code = clGetKernelWorkGroupInfo(kernel->handle, device->id, CL_KERNEL_WORK_GROUP_SIZE,
+                                        sizeof kernel->max_group, &kernel->max_group, NULL);
+    }
+    size_t group[3] = {0};
+    if (code == CL_SUCCESS)
+        code =
+            clGetKernelWorkGroupInfo(kernel->handle, device->id, CL_KERNEL_COMPILE_WORK_GROUP_SIZE,
+                                     sizeof group, group, NULL);
+    kernel->arg_count = arg_count;
+    kernel->group = group[0];
+    if (code == CL_SUCCESS)
+        return OVOID_OK;
+    clReleaseKernel(kernel->handle);
+    return ov_cl_fail(context, code, call, kernel->name);
+}
+
+/* Makes a kernel that the device has not got yet. */
+static ovoid_status add_kernel(ovoid_context *context, ov_device *device, const char *program,
+                               const char *name, struct ov_made **added) {
+    struct ov_made *made = ov_alloc(context, 1, sizeof *made, "a kernel");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    made->kernel = (ov_kernel){.program = program, .name = name};
+    const ovoid_status status = make_kernel(context, device, &made->kernel);
+    if (status != OVOID_OK) {
+        free(made);
+        return status;
+    }
+    made->next = device->made;
+    device->made = made;
+    *added = made;
+    return OVOID_OK;
+}
+
 ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const char *name,
                               ov_kernel *kernel) {
     ov_device *device;
-    cl_program handle;
     ovoid_status status = ov_device_get(context, &device);
-    if (status == OVOID_OK)
-        status = get_program(context, device, program, &handle);
     if (status != OVOID_OK)
         return status;
-    cl_int code;
-    ov_kernel made = {.program = program, .name = name};
-    made.handle = clCreateKernel(handle, name, &code);
+    struct ov_made *made = device->made;
+    while (made &&
+           (strcmp(made->kernel.name, name) != 0 || strcmp(made->kernel.program, program) != 0))
+        made = made->next;
+    if (!made && (status = add_kernel(context, device, program, name, &made)) != OVOID_OK)
+        return status;
+    const cl_int code = clRetainKernel(made->kernel.handle); /* it may outlive the device */
     if (code != CL_SUCCESS)
-        return ov_fail(context, OVOID_ERROR_OPENCL,
-                       "clCreateKernel: %s (%d), kernel %s of %s.cl, device %s", ov_cl_name(code),
-                       (int)code, name, program, device->info.name);
-    cl_uint arg_count = 0;
-    const char *call = "clGetKernelInfo";
-    code = clGetKernelInfo(made.handle, CL_KERNEL_NUM_ARGS, sizeof arg_count, &arg_count, NULL);
-    if (code == CL_SUCCESS) {
-        call = "clGetKernelWorkGroupInfo";
-        code = clGetKernelWorkGroupInfo(made.handle, device->id, CL_KERNEL_WORK_GROUP_SIZE,
-                                        sizeof made.max_group, &made.max_group, NULL);
-    }
-    if (code != CL_SUCCESS) {
-        ov_kernel_destroy(&made);
-        return ov_cl_fail(context, code, call, name);
-    }
-    made.arg_count = arg_count;
-    *kernel = made;
+        return ov_cl_fail(context, code, "clRetainKernel", name);
+    *kernel = made->kernel;
     return OVOID_OK;
 }
 

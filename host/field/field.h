@@ -12,6 +12,8 @@
 #include "field/quadric.h"
 #include "shared.h"
 
+#include <float.h>
+
 /* The float next to x, for what is then to be subtracted from x. Through memory, since GCC 12 drops
  * the rounding of (double)(float)x where it makes vectors of it. */
 static inline float ov_to_float(double x) {
@@ -30,6 +32,7 @@ typedef struct ov_points {
     uint32_t *order;    /* place k of the packs holds the caller's point order[k], OV_PACK entries
                            per pack; NULL where nobody needs it */
     ov_tree tree;       /* of boxes over the packs */
+    float *host_boxes;  /* the tree's boxes; NULL where they are the device's alone */
     float rounding;     /* angstrom by which boxes and floats of centres may be off together */
     ov_buffer xyz;      /* device: per pack OV_PACK x, y, z */
     ov_buffer pack_origins; /* device: pack_origin */
@@ -47,7 +50,7 @@ void ov_points_destroy(ov_points *points);
 double ov_points_pack_reach(double resolution);
 
 /* Uploads points that are in packs already: packed holds OV_PACK x, y, z per pack, and all that is
- * the host's is set, except the tree and rounding. */
+ * the host's is set, except the tree, its boxes and rounding. */
 ovoid_status ov_points_upload(ovoid_context *context, const float *packed, ov_points *points);
 
 /* Points of a pack, without those that fill it up. */
@@ -69,6 +72,32 @@ static inline void ov_points_at(const ov_points *points, const float *packed, si
                    (double)packed[(3 * pack + axis) * OV_PACK + k % OV_PACK];
 }
 
+/* Rounding of points whose boxes' coordinates are at most 1. */
+#define OV_BOX_ROUNDING (2.0f * FLT_EPSILON)
+
+/* ---- packs by themselves ------------------------------------------------------------------ */
+
+/* A list of packs. {0} is an empty one. */
+typedef struct ov_packs {
+    uint32_t *pack;
+    size_t count, capacity;
+} ov_packs;
+void ov_packs_destroy(ov_packs *packs);
+
+/* Sorts them, each once; returns how many that leaves. */
+size_t ov_packs_tidy(uint32_t *packs, size_t count);
+
+/* Adds the packs whose boxes are within reach (angstrom) of a place to those found: a walk down the
+ * tree. */
+ovoid_status ov_packs_near(ovoid_context *context, const ov_points *points, const double at[3],
+                           double reach, ov_packs *found);
+
+/* Makes points of some packs of others, in ascending order, on the device: what it costs goes with
+ * their number. list: their numbers on the device, for kernels/gather.cl. `to` may hold others,
+ * whose memory is used again; its order stays NULL, and its count is that of whole packs. */
+ovoid_status ov_points_gather(ovoid_context *context, const ov_points *from, const uint32_t *packs,
+                              size_t count, ov_buffer *list, ov_points *to);
+
 /* The box about the OV_PACK x, y, z of a pack: low x, y, z, high x, y, z. */
 void ov_pack_box(const float *pack, float box[6]);
 
@@ -83,6 +112,10 @@ ovoid_status ov_sort_keys(ovoid_context *context, const uint64_t *keys, size_t c
  * allocated (free with free()) in the layout of ov_tree, *floats long. */
 ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t count, ov_tree *tree,
                            float **boxes, size_t *floats);
+
+/* Box `box` of a level, from boxes in the layout of ov_tree. */
+void ov_tree_box(const float *boxes, const ov_tree *tree, unsigned level, size_t box,
+                 float value[6]);
 
 /* OVOID_ERROR_LIMIT when an atom's exp(d r^2) is too large for the kernels' floats. */
 ovoid_status ov_atoms_check(ovoid_context *context, const double *xyzr, size_t atoms, double decay);
@@ -110,7 +143,8 @@ void ov_terms_destroy(ov_terms *terms);
 /* ---- lists -------------------------------------------------------------------------------- */
 
 typedef struct ov_lists {
-    bool packs_only; /* set by the owner: term_start and term_item are not wanted */
+    bool packs_only; /* set by the owner: term_start and term_item are not wanted, */
+    bool terms_only; /* or pack_start and pack_item are not */
     size_t terms, packs;
     size_t items;         /* term-pack pairs; each list holds this many entries */
     ov_buffer term_start; /* terms + 1 */

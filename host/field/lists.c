@@ -10,19 +10,20 @@
 /* Numbers of what kernels/lists.cl counts. */
 typedef struct plan {
     cl_uint terms, packs;
-    cl_uint groups;  /* of packs */
+    cl_uint groups;  /* of packs; 0 where their lists are not wanted */
     cl_uint block;   /* terms that share a bin */
     size_t bins;     /* of all groups */
-    size_t counters; /* chunks, bins, groups */
+    size_t counters; /* chunks, terms, bins, groups */
     size_t group;    /* work-items of a work-group */
 } plan;
 
-static plan make_plan(const ov_device *device, const ov_points *points, const ov_terms *terms) {
+static plan make_plan(const ov_device *device, const ov_lists *lists, const ov_points *points,
+                      const ov_terms *terms) {
     plan p = {.terms = (cl_uint)terms->count, .packs = (cl_uint)points->packs};
-    p.groups = (p.packs + OV_GROUP - 1) / OV_GROUP;
+    p.groups = lists->terms_only ? 0 : (p.packs + OV_GROUP - 1) / OV_GROUP;
     p.block = p.terms / OV_BINS + 1;
     p.bins = (size_t)p.groups * OV_BINS;
-    p.counters = 1 + p.bins + p.groups;
+    p.counters = 1 + (size_t)p.terms + p.bins + p.groups;
     p.group = ov_item_group(device);
     return p;
 }
@@ -64,7 +65,6 @@ static size_t chunks_held(const ov_lists *lists) {
 static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_points *points,
                          const ov_terms *terms, double skin, const plan *p) {
     ovoid_status status = OVOID_OK;
-    const size_t told = p->counters + (lists->packs_only ? 0 : p->terms);
     const cl_uint room = (cl_uint)chunks_held(lists);
     const cl_float grow = (cl_float)(skin + (double)points->rounding);
     memset(lists->scan, 0, p->counters * sizeof *lists->scan);
@@ -76,7 +76,8 @@ static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_point
                      OV_ARG(p->block), OV_ARG(room), OV_ARG(lists->tally.memory),
                      OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
                      OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory)));
-    OV_TRY(ov_buffer_read(context, &lists->tally, 0, lists->scan, told * sizeof *lists->scan));
+    OV_TRY(
+        ov_buffer_read(context, &lists->tally, 0, lists->scan, p->counters * sizeof *lists->scan));
 cleanup:
     return status;
 }
@@ -85,11 +86,10 @@ cleanup:
 static ovoid_status find_entries(ovoid_context *context, ov_lists *lists, const ov_points *points,
                                  const ov_terms *terms, double skin, const plan *p) {
     ovoid_status status = OVOID_OK;
-    const size_t counts = p->counters + p->terms;
-    OV_TRY(ov_grow(context, &lists->scan, &lists->scan_capacity, counts + 1, sizeof *lists->scan,
-                   "lists"));
-    OV_TRY(
-        ov_buffer_reserve(context, &lists->tally, counts * sizeof *lists->scan, "counts of lists"));
+    OV_TRY(ov_grow(context, &lists->scan, &lists->scan_capacity, p->counters + 1,
+                   sizeof *lists->scan, "lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->tally, p->counters * sizeof *lists->scan,
+                             "counts of lists"));
     OV_TRY(
         ov_buffer_reserve(context, &lists->chain, p->terms * sizeof(cl_uint2), "chunks of lists"));
     if (!lists->next.memory)
@@ -114,16 +114,24 @@ static uint64_t turn_to_starts(uint32_t *count, size_t size) {
     return sum;
 }
 
-static ovoid_status make_pack_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
-    ovoid_status status = OVOID_OK;
-    uint32_t *const bins = lists->scan + 1, *const pairs = bins + p->bins;
-    const size_t entries = (size_t)turn_to_starts(bins, p->bins); /* no more than pairs */
-    const uint64_t items = turn_to_starts(pairs, p->groups);
+/* Counts the pairs of all terms. */
+static ovoid_status count_items(ovoid_context *context, ov_lists *lists, const plan *p) {
+    uint64_t items = 0;
+    for (size_t i = 0; i < p->terms; ++i)
+        items += lists->scan[1 + i];
     if (items > UINT32_MAX)
         return ov_fail(context, OVOID_ERROR_LIMIT,
                        "more than 2^32 pairs of ellipsoids and packs of points; use a larger "
                        "spacing");
     lists->items = (size_t)items;
+    return OVOID_OK;
+}
+
+static ovoid_status make_pack_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    uint32_t *const bins = lists->scan + 1 + p->terms, *const pairs = bins + p->bins;
+    const size_t entries = (size_t)turn_to_starts(bins, p->bins); /* no more than pairs */
+    turn_to_starts(pairs, p->groups);
     OV_TRY(ov_buffer_put(context, &lists->place, bins, (p->bins + p->groups) * sizeof *bins,
                          "starts of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->group_term, entries * sizeof(cl_uint),
@@ -149,8 +157,9 @@ cleanup:
 
 static ovoid_status make_term_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
     ovoid_status status = OVOID_OK;
-    uint32_t *const start = lists->scan + p->counters;
-    start[p->terms] = (uint32_t)turn_to_starts(start, p->terms);
+    uint32_t *const start = lists->scan + 1;
+    turn_to_starts(start, p->terms);
+    start[p->terms] = (uint32_t)lists->items; /* over a bin that has been uploaded */
     OV_TRY(ov_buffer_put(context, &lists->term_start, start, (p->terms + (size_t)1) * sizeof *start,
                          "starts of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * sizeof(cl_uint),
@@ -168,12 +177,14 @@ ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_po
     ovoid_status status = OVOID_OK;
     ov_device *device;
     OV_TRY(ov_device_get(context, &device));
-    const plan p = make_plan(device, points, terms);
+    const plan p = make_plan(device, lists, points, terms);
     OV_TRY(prepare(context, lists));
     lists->terms = terms->count;
     lists->packs = points->packs;
     OV_TRY(find_entries(context, lists, points, terms, skin, &p));
-    OV_TRY(make_pack_lists(context, lists, &p));
+    OV_TRY(count_items(context, lists, &p));
+    if (!lists->terms_only)
+        OV_TRY(make_pack_lists(context, lists, &p));
     if (!lists->packs_only)
         OV_TRY(make_term_lists(context, lists, &p));
 cleanup:

@@ -46,9 +46,8 @@ static ovoid_status launch_terms(ovoid_context *context, const ov_kernel *kernel
     const ovoid_status status = ov_device_get(context, &device);
     if (status != OVOID_OK)
         return status;
-    return device->shape.lanes == 1
-               ? ov_launch(context, kernel, terms, CPU_GROUP, args, arg_count)
-               : ov_launch(context, kernel, terms * OV_TEAM, OV_TEAM, args, arg_count);
+    const size_t team = device->team;
+    return ov_launch(context, kernel, terms * team, team == 1 ? CPU_GROUP : team, args, arg_count);
 }
 
 #define ARGS(...)                                                                                  \

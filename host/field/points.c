@@ -28,21 +28,22 @@ static void widen_box(float box[BOX], const float other[BOX]) {
     }
 }
 
-static float *box_entry(float *boxes, const ov_tree *tree, unsigned level, size_t box) {
+/* Where a box's first coordinate is. */
+static size_t box_entry(const ov_tree *tree, unsigned level, size_t box) {
     const size_t group = tree->groups[level] + box / OV_GROUP;
-    return boxes + group * (BOX * OV_GROUP) + box % OV_GROUP;
+    return group * (BOX * OV_GROUP) + box % OV_GROUP;
 }
 
 static void put_box(float *boxes, const ov_tree *tree, unsigned level, size_t box,
                     const float value[BOX]) {
-    float *const entry = box_entry(boxes, tree, level, box);
+    float *const entry = boxes + box_entry(tree, level, box);
     for (int k = 0; k < BOX; ++k)
         entry[(size_t)k * OV_GROUP] = value[k];
 }
 
-static void get_box(float *boxes, const ov_tree *tree, unsigned level, size_t box,
-                    float value[BOX]) {
-    const float *const entry = box_entry(boxes, tree, level, box);
+void ov_tree_box(const float *boxes, const ov_tree *tree, unsigned level, size_t box,
+                 float value[BOX]) {
+    const float *const entry = boxes + box_entry(tree, level, box);
     for (int k = 0; k < BOX; ++k)
         value[k] = entry[(size_t)k * OV_GROUP];
 }
@@ -85,7 +86,7 @@ ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t c
                 float other[BOX];
                 if (b >= used || child >= tree->boxes[level - 1])
                     break;
-                get_box(made, tree, level - 1, child, other);
+                ov_tree_box(made, tree, level - 1, child, other);
                 widen_box(box, other);
             }
             put_box(made, tree, level, b, box);
@@ -179,26 +180,28 @@ static void box_packs(const float *packed, ov_points *points, float *leaves) {
             largest = fabsf(leaf[k]) > largest ? fabsf(leaf[k]) : largest;
         }
     }
-    points->rounding = 2.0f * FLT_EPSILON * largest;
+    points->rounding = OV_BOX_ROUNDING * largest;
 }
 
 ovoid_status ov_points_upload(ovoid_context *context, const float *packed, ov_points *points) {
     ovoid_status status = OVOID_OK;
-    float *boxes = NULL;
     size_t floats = 0;
     const size_t bytes = points->packs * 3 * OV_PACK * sizeof *packed;
     float *const leaves = ov_alloc(context, points->packs * BOX, sizeof *leaves, "boxes of packs");
     if (!leaves)
         return OVOID_ERROR_MEMORY;
+    free(points->host_boxes);
+    points->host_boxes = NULL;
     box_packs(packed, points, leaves);
-    OV_TRY(ov_tree_build(context, leaves, points->packs, &points->tree, &boxes, &floats));
+    OV_TRY(
+        ov_tree_build(context, leaves, points->packs, &points->tree, &points->host_boxes, &floats));
     OV_TRY(ov_buffer_put(context, &points->xyz, packed, bytes, "points"));
     OV_TRY(ov_buffer_put(context, &points->pack_origins, points->pack_origin,
                          points->packs * 4 * sizeof *points->pack_origin, "origins of packs"));
-    OV_TRY(ov_buffer_put(context, &points->boxes, boxes, floats * sizeof *boxes, "boxes of packs"));
+    OV_TRY(ov_buffer_put(context, &points->boxes, points->host_boxes,
+                         floats * sizeof *points->host_boxes, "boxes of packs"));
 cleanup:
     free(leaves);
-    free(boxes);
     return status;
 }
 
@@ -326,6 +329,7 @@ cleanup:
 void ov_points_destroy(ov_points *points) {
     free(points->order);
     free(points->pack_origin);
+    free(points->host_boxes);
     ov_buffer_destroy(&points->xyz);
     ov_buffer_destroy(&points->pack_origins);
     ov_buffer_destroy(&points->boxes);

@@ -1,6 +1,7 @@
 #include "fit/fitter.h"
 
 #include "base/progress.h"
+#include "base/sized.h"
 #include "fit/adaptive/adaptive.h"
 #include "fit/l1/l1.h"
 #include "fit/motion.h"
@@ -37,13 +38,16 @@ ovoid_status ov_fitter_create(ovoid_context *context, const ovoid_molecule *mole
     ovoid_status status = OVOID_OK;
     const size_t atoms = ovoid_molecule_atoms(molecule);
     ovoid_fitter *made = NULL;
-    OV_TRY(ov_surface_options_check(context, options));
+    ovoid_fit_options surface;
+    ovoid_fit_options_init(&surface, sizeof surface);
+    OV_TRY(OV_SIZED_TAKE(context, ovoid_fit_options, options, &surface));
+    OV_TRY(ov_surface_options_check(context, &surface));
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
-    OV_TRY(ov_atoms_check(context, xyzr, atoms, options->decay));
+    OV_TRY(ov_atoms_check(context, xyzr, atoms, surface.decay));
     made = ov_alloc(context, 1, sizeof *made, "a fitter");
     if (!made)
         return OVOID_ERROR_MEMORY;
-    *made = (ovoid_fitter){.context = context, .once = once, .atoms = atoms, .surface = *options};
+    *made = (ovoid_fitter){.context = context, .once = once, .atoms = atoms, .surface = surface};
     made->xyzr = ov_alloc(context, 4 * atoms, sizeof *made->xyzr, "atoms");
     if (!made->xyzr) {
         status = OVOID_ERROR_MEMORY;
@@ -119,7 +123,7 @@ static ovoid_status fit_l1(ovoid_fitter *fitter, const ovoid_fit_options *option
     result->sample_seconds = ov_seconds() - began;
     result->spacing = options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1;
     result->reached = true;
-    result->distance = NAN;
+    result->verdict = OVOID_VERDICT_NO_GOAL;
     OV_TRY(ov_l1_fit(fitter->context, fitter->xyzr, fitter->atoms, ov_l1_band_samples(fitter->band),
                      options, ellipsoids, owner, result));
 cleanup:
@@ -176,6 +180,8 @@ static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, 
     ovoid_status status = OVOID_OK;
     ov_device *device;
     OV_TRY(ov_fit_options_check(fitter->context, options));
+    ov_progress_fit(fitter->context, options->method);
+    result->method = options->method;
     OV_TRY(check_surface(fitter, options));
     OV_TRY(ov_device_get(fitter->context, &device));
     OV_TRY(options->method == OVOID_METHOD_L1
@@ -185,40 +191,59 @@ cleanup:
     return status;
 }
 
+/* The model of what was found, and the last of the result. */
+static ovoid_status make_model(const ovoid_fitter *fitter, const ovoid_ellipsoid *ellipsoids,
+                               uint32_t **owner, double began, ovoid_fit_result *result,
+                               ovoid_model **model) {
+    const ovoid_status status =
+        ovoid_model_create(fitter->context, ellipsoids, (size_t)result->ellipsoids,
+                           fitter->surface.decay, fitter->surface.isovalue, model);
+    if (status == OVOID_OK)
+        ov_model_take_owner(*model, owner, fitter->atoms);
+    result->fit_seconds = ov_seconds() - began - result->sample_seconds;
+    return status;
+}
+
+/* A model with OVOID_OK, and maybe with OVOID_ERROR_CANCELLED. */
+static ovoid_status reach(ovoid_fitter *fitter, const ovoid_fit_options *options,
+                          ovoid_model **model, ovoid_fit_result *result) {
+    ovoid_ellipsoid *ellipsoids = NULL;
+    uint32_t *owner = NULL;
+    const double began = ov_seconds();
+    ovoid_status status = fit(fitter, options, began, &ellipsoids, &owner, result);
+    if (ellipsoids && (status == OVOID_OK || status == OVOID_ERROR_CANCELLED)) {
+        const ovoid_status made = make_model(fitter, ellipsoids, &owner, began, result, model);
+        status = made == OVOID_OK ? status : made;
+    }
+    free(ellipsoids);
+    free(owner);
+    return status;
+}
+
 ovoid_status ovoid_fitter_reach(ovoid_context *context, ovoid_fitter *fitter,
                                 const ovoid_fit_options *options, ovoid_model **model,
                                 ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
-    ovoid_ellipsoid *ellipsoids = NULL;
-    uint32_t *owner = NULL;
     ovoid_model *made = NULL;
-    ovoid_fit_result done = {0};
+    ovoid_fit_options wanted;
+    ovoid_fit_result done;
     OV_NEED(context, context);
     OV_NEED(context, fitter);
     OV_NEED(context, options);
     OV_NEED(context, model);
-    const double began = ov_seconds();
+    ovoid_fit_options_init(&wanted, sizeof wanted);
+    ovoid_fit_result_init(&done, sizeof done);
     ov_progress_begin(context, "sample");
     context->now.ellipsoids = fitter->atoms;
     OV_TRY(check_context(context, fitter));
-    status = fit(fitter, options, began, &ellipsoids, &owner, &done);
-    if (status != OVOID_OK && status != OVOID_ERROR_CANCELLED)
-        goto cleanup;
-    if (ellipsoids) {
-        const ovoid_status handed = ovoid_model_create(context, ellipsoids, (size_t)done.ellipsoids,
-                                                       options->decay, options->isovalue, &made);
-        status = handed == OVOID_OK ? status : handed;
-        if (!made)
-            goto cleanup;
-        ov_model_take_owner(made, &owner, fitter->atoms);
-        done.fit_seconds = ov_seconds() - began - done.sample_seconds;
-        if (result)
-            *result = done;
-    }
-    *model = made;
+    OV_TRY(OV_SIZED_TAKE(context, ovoid_fit_options, options, &wanted));
+    OV_TRY(ov_sized_check(context, "ovoid_fit_result", result));
+    status = reach(fitter, &wanted, &made, &done);
+    if (status == OVOID_OK || status == OVOID_ERROR_CANCELLED)
+        *model = made;
+    if (made)
+        ov_sized_give(result, &done, sizeof done);
 cleanup:
-    free(ellipsoids);
-    free(owner);
     ov_progress_end(context);
     return status;
 }

@@ -1,12 +1,12 @@
 #include "fit/options.h"
 
+#include "base/sized.h"
+
 #include <math.h>
 #include <stdio.h>
 
-void ovoid_fit_options_init(ovoid_fit_options *options) {
-    if (!options)
-        return;
-    *options = (ovoid_fit_options){
+void ovoid_fit_options_init(ovoid_fit_options *options, size_t size) {
+    static const ovoid_fit_options defaults = {
         .method = OVOID_METHOD_ADAPTIVE,
         .decay = OVOID_DEFAULT_DECAY,
         .isovalue = OVOID_DEFAULT_ISOVALUE,
@@ -39,6 +39,24 @@ void ovoid_fit_options_init(ovoid_fit_options *options) {
                 .max_backtracks = 30,
             },
     };
+    ov_sized_init(options, size, &defaults, sizeof defaults);
+}
+
+void ovoid_fit_result_init(ovoid_fit_result *result, size_t size) {
+    static const ovoid_fit_result unknown = {
+        .spacing = NAN,
+        .points = OVOID_UNKNOWN,
+        .ellipsoids = OVOID_UNKNOWN,
+        .iterations = OVOID_UNKNOWN,
+        .distance = NAN,
+        .sample_seconds = NAN,
+        .fit_seconds = NAN,
+        .l1 = {NAN, NAN, NAN, NAN, NAN, NAN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN},
+        .adaptive = {OVOID_UNKNOWN},
+        .counts = {OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN,
+                   OVOID_UNKNOWN, OVOID_UNKNOWN},
+    };
+    ov_sized_init(result, size, &unknown, sizeof unknown);
 }
 
 typedef struct range {

@@ -57,7 +57,7 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     ov_body *const bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
     if (!bodies)
         return OVOID_ERROR_MEMORY;
-    ovoid_mesh_options_init(&made.meshing);
+    ovoid_mesh_options_init(&made.meshing, sizeof made.meshing);
     made.meshing.isovalue = isovalue;
     made.meshing.spacing = spacing;
     middle_of(xyzr, atoms, made.origin);

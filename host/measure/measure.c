@@ -1,17 +1,43 @@
 #include "measure/measure.h"
+
+#include "base/sized.h"
 #include "measure/distance.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-void ovoid_measure_options_init(ovoid_measure_options *options) {
-    if (!options)
-        return;
-    *options = (ovoid_measure_options){.isovalue = OVOID_DEFAULT_ISOVALUE,
-                                       .spacing = OVOID_DEFAULT_MESH_SPACING,
-                                       .vertices = OVOID_VERTEX_EXACT,
-                                       .distances = true};
+void ovoid_measure_options_init(ovoid_measure_options *options, size_t size) {
+    static const ovoid_measure_options defaults = {.isovalue = OVOID_DEFAULT_ISOVALUE,
+                                                   .spacing = OVOID_DEFAULT_MESH_SPACING,
+                                                   .vertices = OVOID_VERTEX_EXACT,
+                                                   .distances = true};
+    ov_sized_init(options, size, &defaults, sizeof defaults);
+}
+
+#define NO_PAIR                                                                                    \
+    { NAN, NAN, NAN }
+#define NO_DISTANCES                                                                               \
+    { NAN, NAN, NAN, NAN, NAN }
+
+static const ovoid_measures unknown = {
+    .area = NO_PAIR,
+    .volume = NO_PAIR,
+    .area_outer = NO_PAIR,
+    .volume_outer = NO_PAIR,
+    .components_original = OVOID_UNKNOWN,
+    .components_sparse = OVOID_UNKNOWN,
+    .outer_original = OVOID_UNKNOWN,
+    .outer_sparse = OVOID_UNKNOWN,
+    .distances = NO_DISTANCES,
+    .distances_outer = NO_DISTANCES,
+    .deviation = NAN,
+    .seconds_mesh = NAN,
+    .seconds_distances = NAN,
+};
+
+void ovoid_measures_init(ovoid_measures *measures, size_t size) {
+    ov_sized_init(measures, size, &unknown, sizeof unknown);
 }
 
 static ovoid_pair pair_of(double original, double sparse) {
@@ -71,10 +97,11 @@ ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *origina
                                ovoid_measures *measures) {
     ovoid_status status = OVOID_OK;
     const double begin = ov_seconds();
-    ovoid_measures made = {.components_original = original->components,
-                           .components_sparse = sparse->components,
-                           .outer_original = count_outer(original),
-                           .outer_sparse = count_outer(sparse)};
+    ovoid_measures made = unknown;
+    made.components_original = original->components;
+    made.components_sparse = sparse->components;
+    made.outer_original = count_outer(original);
+    made.outer_sparse = count_outer(sparse);
     OV_TRY(compare_contents(context, original, sparse, smooth, false, &made.area, &made.volume));
     OV_TRY(compare_contents(context, original, sparse, smooth, true, &made.area_outer,
                             &made.volume_outer));
@@ -107,24 +134,28 @@ ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecul
     ovoid_status status = OVOID_OK;
     ovoid_mesh *original = NULL, *sparse = NULL;
     ovoid_measures made;
+    ovoid_measure_options o;
     OV_NEED(context, context);
     OV_NEED(context, molecule);
     OV_NEED(context, model);
     OV_NEED(context, options);
     OV_NEED(context, measures);
     ov_progress_begin(context, "mesh");
+    ovoid_measure_options_init(&o, sizeof o);
+    OV_TRY(OV_SIZED_TAKE(context, ovoid_measure_options, options, &o));
+    OV_TRY(ov_sized_check(context, "ovoid_measures", measures));
     const double begin = ov_seconds();
-    const ovoid_mesh_options meshing = {options->isovalue, options->spacing, options->vertices};
+    const ovoid_mesh_options meshing = {sizeof meshing, o.isovalue, o.spacing, o.vertices};
     status = ovoid_molecule_mesh(context, molecule, ovoid_model_decay(model), &meshing, &original);
     OV_TRY(name_failure(context, status, "molecule"));
     status = ovoid_model_mesh(context, model, &meshing, &sparse);
     OV_TRY(name_failure(context, status, "model"));
     const double meshed = ov_seconds();
     ov_progress_stage(context, "measure");
-    OV_TRY(ov_measure_meshes(context, original, sparse, options->vertices == OVOID_VERTEX_EXACT,
-                             options->distances, &made));
+    OV_TRY(ov_measure_meshes(context, original, sparse, o.vertices == OVOID_VERTEX_EXACT,
+                             o.distances, &made));
     made.seconds_mesh = meshed - begin;
-    *measures = made;
+    ov_sized_give(measures, &made, sizeof made);
 cleanup:
     ovoid_mesh_destroy(&original);
     ovoid_mesh_destroy(&sparse);

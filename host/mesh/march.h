@@ -6,7 +6,7 @@
 
 #include "mesh/mesh.h"
 #include "mesh/pieces.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 /* Lattice points of a piece, per axis, at most: a million, 16 MB on the device. Multiples of the
  * bricks' sides. The kernels' names of edges hold no more. */

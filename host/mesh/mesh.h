@@ -6,7 +6,7 @@
 
 #include "base/base.h"
 #include "base/progress.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 /* A light mesh, which the library keeps for itself, has offsets instead of xyz, knows nothing of
  * its edges (its components' closed and euler are 0), and may have given up its normals. */

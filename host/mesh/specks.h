@@ -8,7 +8,7 @@
 #define OV_SPECKS_H
 
 #include "mesh/pieces.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 /* A lattice is halved so often for a speck, at most: what is smaller than about a thousandth of the
  * spacing is only counted. */

@@ -1,4 +1,5 @@
 #include "base/progress.h"
+#include "base/sized.h"
 #include "molecule/cif.h"
 #include "molecule/radii.h"
 #include "molecule/reader.h"
@@ -423,11 +424,8 @@ static void trim(ovoid_molecule *m) {
 /* ---- options ------------------------------------------------------------------------------- */
 
 void ovoid_read_options_init(ovoid_read_options *options, size_t size) {
-    const ovoid_read_options defaults = {.size = size};
-    if (!options)
-        return;
-    memset(options, 0, size);
-    memcpy(options, &defaults, size < sizeof defaults ? size : sizeof defaults);
+    const ovoid_read_options defaults = {0};
+    ov_sized_init(options, size, &defaults, sizeof defaults);
 }
 
 /* The caller's options, those that its version of the structure lacks filled in. */
@@ -436,11 +434,9 @@ static ovoid_status complete_options(ovoid_context *context, const ovoid_read_op
     ovoid_read_options_init(options, sizeof *options);
     if (!given)
         return OVOID_OK;
-    if (given->size < sizeof given->size + sizeof given->format || given->size > 4096)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_molecule_read_with: the options were not initialised");
-    memcpy(options, given, given->size < sizeof *options ? given->size : sizeof *options);
-    options->size = sizeof *options;
+    const ovoid_status status = OV_SIZED_TAKE(context, ovoid_read_options, given, options);
+    if (status != OVOID_OK)
+        return status;
     if ((int)options->format < OVOID_MOLECULE_AUTO || options->format > OVOID_MOLECULE_MMCIF)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "ovoid_molecule_read: %d is no format",
                        (int)options->format);
@@ -482,6 +478,7 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
     OV_TRY(ov_molecule_doubts(context, ov_text_name(reader.text), reader.molecule));
     reader.molecule->counts.atoms = ovoid_molecule_atoms(reader.molecule);
     reader.molecule->counts.unit_atoms = reader.molecule->atoms;
+    reader.molecule->counts.size = sizeof reader.molecule->counts;
     *molecule = reader.molecule;
     reader.molecule = NULL;
 cleanup:
@@ -536,6 +533,7 @@ ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, s
     made->atoms = atoms;
     made->counts.atoms = atoms;
     made->counts.unit_atoms = atoms;
+    made->counts.size = sizeof made->counts;
     count_zero_radii(made);
     made->counts.models = 1;
     made->radii = OVOID_RADII_OWN;
@@ -630,8 +628,8 @@ size_t ovoid_molecule_origin(const ovoid_molecule *molecule, size_t atom, size_t
     return part->index && within < part->atoms ? part->index[within] : within;
 }
 
-ovoid_molecule_counts ovoid_molecule_read_counts(const ovoid_molecule *molecule) {
-    return molecule ? molecule->counts : (ovoid_molecule_counts){0};
+const ovoid_molecule_counts *ovoid_molecule_read_counts(const ovoid_molecule *molecule) {
+    return molecule ? &molecule->counts : NULL;
 }
 
 ovoid_molecule_format ovoid_molecule_read_format(const ovoid_molecule *molecule) {

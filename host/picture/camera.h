@@ -6,7 +6,7 @@
 
 #include "base/base.h"
 #include "field/quadric.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 typedef struct ov_camera {
     double axis[3][3]; /* unit vectors: to the right, up, toward the eye */

@@ -5,7 +5,7 @@
 #define OV_IMAGE_H
 
 #include "base/base.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 #include "picture/palette.h"
 
 struct ovoid_image {

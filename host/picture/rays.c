@@ -228,7 +228,7 @@ static ovoid_status prepare(ovoid_context *context, ov_kernel *kernel, const cha
         .front = (cl_float)boxes->front,
         .step = (cl_float)boxes->step,
         .global = packs * (OV_PACK / device->shape.vector),
-        .group = ov_kernel_group(kernel, device->shape.lanes == 1 ? CPU_GROUP : GPU_GROUP),
+        .group = device->shape.lanes == 1 ? CPU_GROUP : GPU_GROUP,
     };
 cleanup:
     return status;

@@ -1,6 +1,7 @@
 #include "picture/render.h"
 
 #include "base/progress.h"
+#include "base/sized.h"
 #include "model/ellipsoid.h"
 #include "model/model.h"
 #include "picture/colour_bar.h"
@@ -25,10 +26,8 @@ const ov_lights ov_default_lights = {
 #define SHADE_GROUP 64
 #define PANEL 3 /* pictures in a panel */
 
-void ovoid_picture_options_init(ovoid_picture_options *options) {
-    if (!options)
-        return;
-    *options = (ovoid_picture_options){
+void ovoid_picture_options_init(ovoid_picture_options *options, size_t size) {
+    static const ovoid_picture_options defaults = {
         .view = OVOID_VIEW_ORIGINAL,
         .width = 1200,
         .height = 900,
@@ -42,6 +41,7 @@ void ovoid_picture_options_init(ovoid_picture_options *options) {
         .centres = true,
         .colour_bar = true,
     };
+    ov_sized_init(options, size, &defaults, sizeof defaults);
 }
 
 /* One field: its terms in the world and as the camera sees them, its boxes, what rays meet. */
@@ -349,10 +349,10 @@ static ovoid_status launch_shade(painter *p, const scene *base, paint by, const 
     const cl_float4 key = to_float4(lights->key), fill = to_float4(lights->fill);
     const cl_float4 ambient_near_far_fade = to_float4(numbers);
     return OV_LAUNCH(
-        p->context, &p->shade, (size_t)width * height, ov_kernel_group(&p->shade, SHADE_GROUP),
-        OV_ARG(width), OV_ARG(height), OV_ARG(samples), OV_ARG(blocks), OV_ARG(spacing),
-        OV_ARG(hits->depth.memory), OV_ARG(hits->normal.memory), OV_ARG(hits->extra.memory),
-        OV_ARG(how), OV_ARG(p->palette.memory), OV_ARG(palette_size), OV_ARG(range), OV_ARG(glass),
+        p->context, &p->shade, (size_t)width * height, SHADE_GROUP, OV_ARG(width), OV_ARG(height),
+        OV_ARG(samples), OV_ARG(blocks), OV_ARG(spacing), OV_ARG(hits->depth.memory),
+        OV_ARG(hits->normal.memory), OV_ARG(hits->extra.memory), OV_ARG(how),
+        OV_ARG(p->palette.memory), OV_ARG(palette_size), OV_ARG(range), OV_ARG(glass),
         OV_ARG(glass_hits->depth.memory), OV_ARG(glass_hits->normal.memory), OV_ARG(own),
         OV_ARG(tint), OV_ARG(background), OV_ARG(haze), OV_ARG(key), OV_ARG(fill),
         OV_ARG(ambient_near_far_fade), OV_ARG(p->taps.memory), OV_ARG(taps), OV_ARG(reach),
@@ -524,25 +524,28 @@ ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule
     OV_NEED(context, context);
     OV_NEED(context, options);
     OV_NEED(context, image);
-    ovoid_status status = check(context, molecule, decay, model, options);
+    ovoid_picture_options o;
+    ovoid_picture_options_init(&o, sizeof o);
+    ovoid_status status = OV_SIZED_TAKE(context, ovoid_picture_options, options, &o);
+    if (status == OVOID_OK)
+        status = check(context, molecule, decay, model, &o);
     if (status != OVOID_OK)
         return status;
-    painter p = {.context = context, .options = options};
+    painter p = {.context = context, .options = &o};
     ovoid_image *made = NULL;
     ov_progress_begin(context, "render");
-    const bool panel = options->view == OVOID_VIEW_PANEL;
+    const bool panel = o.view == OVOID_VIEW_PANEL;
     ov_palette_diverging(p.diverging);
     ov_palette_distinct(p.distinct);
     OV_TRY(load_scenes(&p, molecule, decay, model));
     place_camera(&p);
-    OV_TRY(ov_image_make(context, options->width, options->height, &made));
+    OV_TRY(ov_image_make(context, o.width, o.height, &made));
     if (panel)
         OV_TRY(paint_panel(&p, made));
     else
-        OV_TRY(paint_view(&p, options->view,
-                          options->centres && (options->view == OVOID_VIEW_MODEL ||
-                                               options->view == OVOID_VIEW_ELLIPSOIDS),
-                          made));
+        OV_TRY(paint_view(
+            &p, o.view,
+            o.centres && (o.view == OVOID_VIEW_MODEL || o.view == OVOID_VIEW_ELLIPSOIDS), made));
     *image = made;
     made = NULL;
 cleanup:

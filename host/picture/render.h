@@ -4,7 +4,7 @@
 #ifndef OV_RENDER_H
 #define OV_RENDER_H
 
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 #include "picture/camera.h"
 #include "picture/rays.h"
 

@@ -2,6 +2,7 @@
 
 #include "base/file.h"
 #include "base/progress.h"
+#include "base/sized.h"
 #include "field/field.h"
 #include "model/ellipsoid.h"
 #include "write/text.h"
@@ -51,20 +52,26 @@ ovoid_export_format ovoid_export_format_find(const char *name) {
     return OVOID_EXPORT_AUTO;
 }
 
-void ovoid_export_options_init(ovoid_export_options *options) {
-    if (!options)
-        return;
-    *options = (ovoid_export_options){.spacing = OVOID_DEFAULT_MESH_SPACING,
-                                      .colour = {0.30, 0.55, 0.80},
-                                      .opacity = 1.0,
-                                      .max_gigabytes = OVOID_DEFAULT_MAP_GIGABYTES};
+void ovoid_export_options_init(ovoid_export_options *options, size_t size) {
+    static const ovoid_export_options defaults = {.spacing = OVOID_DEFAULT_MESH_SPACING,
+                                                  .colour = {0.30, 0.55, 0.80},
+                                                  .opacity = 1.0,
+                                                  .max_gigabytes = OVOID_DEFAULT_MAP_GIGABYTES};
+    ov_sized_init(options, size, &defaults, sizeof defaults);
 }
 
 static bool is_share(double value) {
     return value >= 0.0 && value <= 1.0;
 }
 
-static ovoid_status check_options(ovoid_context *context, const ovoid_export_options *o) {
+/* The caller's options, whole and within their ranges; NULL: the defaults. */
+static ovoid_status take_options(ovoid_context *context, const ovoid_export_options *given,
+                                 ovoid_export_options *o) {
+    ovoid_export_options_init(o, sizeof *o);
+    const ovoid_status status =
+        given ? OV_SIZED_TAKE(context, ovoid_export_options, given, o) : OVOID_OK;
+    if (status != OVOID_OK)
+        return status;
     if ((size_t)o->format >= FORMATS)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "%d is no format of an export",
                        (int)o->format);
@@ -186,10 +193,7 @@ ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model
     OV_NEED(context, path);
     ovoid_export_options o;
     const format *chosen;
-    ovoid_export_options_init(&o);
-    if (options)
-        o = *options;
-    ovoid_status status = check_options(context, &o);
+    ovoid_status status = take_options(context, options, &o);
     if (status == OVOID_OK)
         status = choose_format(context, path, &o, true, &chosen);
     if (status != OVOID_OK)
@@ -219,10 +223,7 @@ ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule 
     ovoid_export_options o;
     const format *chosen;
     char label[80];
-    ovoid_export_options_init(&o);
-    if (options)
-        o = *options;
-    OV_TRY(check_options(context, &o));
+    OV_TRY(take_options(context, options, &o));
     OV_TRY(choose_format(context, path, &o, false, &chosen));
     OV_TRY(ov_atoms_check(context, xyzr, atoms, decay));
     quadrics = ov_alloc(context, atoms, sizeof *quadrics, "atoms");

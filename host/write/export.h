@@ -9,7 +9,7 @@
 
 #include "base/base.h"
 #include "field/quadric.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 #include <stdio.h>
 

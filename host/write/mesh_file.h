@@ -13,7 +13,7 @@
 #define OV_MESH_FILE_H
 
 #include "base/base.h"
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 #include <stdio.h>
 

@@ -15,7 +15,7 @@
 #ifndef OVOID_FITTER_H
 #define OVOID_FITTER_H
 
-#include "ovoid/ovoid.h"
+#include "ovoid/fit.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -36,9 +36,9 @@ OVOID_API void ovoid_fitter_destroy(ovoid_fitter **fitter);
 
 /* Fits a model by the method and to the goal in the options, as ovoid_fit() does, but for preparing
  * what has been prepared before: from the atoms it comes to the same bits, whatever the fitter did
- * before. result may be NULL; sample_seconds is next to nothing where the points were there.
- * Options that define the surface and differ from those that the fitter was made with are
- * OVOID_ERROR_ARGUMENT.
+ * before. result may be NULL, else it was made by ovoid_fit_result_init(); sample_seconds is next
+ * to nothing where the points were there. Options that define the surface and differ from those
+ * that the fitter was made with are OVOID_ERROR_ARGUMENT.
  *
  * OVOID_ERROR_CANCELLED, when the progress callback asked to stop, hands over the best model that
  * held by then, if one did: *model is it, to be destroyed by the caller, and *result says of it

@@ -81,7 +81,13 @@ static const char *const numbers[] = {"atoms",
                                       "seconds.write",
                                       "seconds.total",
                                       "opencl.compute_units",
-                                      "profile.launches"};
+                                      "profile.launches",
+                                      "profile.blocking_reads",
+                                      "profile.blocking_writes",
+                                      "profile.bytes_to_device",
+                                      "profile.bytes_from_device",
+                                      "profile.buffers_created",
+                                      "profile.kernels_created"};
 static const char *const texts[] = {"version",       "input",         "output",
                                     "method",        "device",        "opencl.platform",
                                     "opencl.vendor", "opencl.driver", "opencl.version"};
@@ -225,6 +231,11 @@ static void check_kernels(const cJSON *report) {
         before = seconds;
     }
     expect(share <= 1.0, "the sum of shares", share, 1.0);
+    expect(number(report, "profile.bytes_from_device") > number(report, "profile.blocking_reads"),
+           "profile.bytes_from_device", number(report, "profile.bytes_from_device"),
+           number(report, "profile.blocking_reads"));
+    expect(number(report, "profile.kernels_created") < counted, "profile.kernels_created",
+           number(report, "profile.kernels_created"), counted);
     if (is_adaptive(report) && !find(report, "levels"))
         expect(launches == counted, "the sum of launches", launches, counted);
     else

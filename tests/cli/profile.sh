@@ -30,6 +30,8 @@ check_table() {
 run "$OVOID" fit a.xyzr --ellipsoids 5 --steps 10 --profile --report r.json --trace t.csv
 expect_code 0
 expect_silent
+grep -q '^The device took [0-9.]* MB, gave [0-9.]* MB in [1-9][0-9]* blocking reads' "$out" ||
+    fail "what passed between host and device was expected"
 check_table fit
 for kernel in field moments packs_of_terms distances; do
     table | grep -q "^$kernel " || fail "a row of $kernel was expected"
@@ -77,6 +79,14 @@ check_table measure
 table | grep -q '^distances ' || fail "a row of distances was expected"
 [ "$(table | grep -c '^march_')" -ge 5 ] || fail "rows of march were expected"
 grep -q '"kernels"' m.json || fail "the report should hold the kernels"
+# A kernel object for each row, two counts that hold whatever the work was, and launches as in the table.
+number() { sed -n "s/^.*\"$1\":[[:space:]]*\([0-9]*\).*/\1/p" m.json | head -n 1; }
+launches=$(sed -n '/"profile"/,/}/s/.*"launches":[[:space:]]*\([0-9]*\).*/\1/p' m.json | head -n 1)
+[ "$launches" = "$(table | awk '{ n = $2 } END { print n }')" ] || fail "launches: $launches"
+[ "$(number bytes_from_device)" -gt "$(number blocking_reads)" ] || fail "reads of a byte or more each"
+[ "$(number bytes_to_device)" -gt 0 ] || fail "something is written"
+[ "$(number buffers_created)" -gt 0 ] || fail "buffers are created"
+[ "$(number kernels_created)" -ge "$(table | grep -cv '^all_else\|^measure')" ] || fail "kernels are created"
 run "$OVOID" measure a.xyzr a.ovoid --report m.json
 expect_code 0
 grep -q "all else" "$out" && fail "no table was asked for"

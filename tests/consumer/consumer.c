@@ -6,7 +6,7 @@ int main(int argc, char **argv) {
     ovoid_molecule *molecule = NULL;
     ovoid_model *model = NULL;
     ovoid_fit_options options;
-    ovoid_fit_options_init(&options);
+    ovoid_fit_options_init(&options, sizeof options);
     bool done = argc == 3 && ovoid_context_create(&context) == OVOID_OK &&
                 ovoid_molecule_read(context, argv[1], OVOID_MOLECULE_AUTO, &molecule) == OVOID_OK &&
                 ovoid_fit(context, molecule, &options, &model, NULL) == OVOID_OK &&

@@ -23,7 +23,7 @@ for pattern in include/ovoid/ovoid.h bin/ovoid 'lib*/cmake/ovoid/ovoidConfig.cma
     share/man/man1/ovoid-fit.1 share/bash-completion/completions/ovoid; do
     find "$folder" -path "$folder/$pattern" | grep -q . || { echo "$pattern is missing"; exit 1; }
 done
-library='libovoid.so libovoid.so.0'
+library='libovoid.so libovoid.so.1'
 [ "$kind" = shared ] || library=libovoid.a
 for name in $library ovoid.pc; do
     find "$folder" -name "$name" | grep -q . || { echo "$name is missing"; exit 1; }

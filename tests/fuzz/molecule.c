@@ -46,7 +46,7 @@ static void check_identity(const ovoid_molecule *m) {
 }
 
 static void check_counts(const ovoid_molecule *m) {
-    const ovoid_molecule_counts c = ovoid_molecule_read_counts(m);
+    const ovoid_molecule_counts c = *ovoid_molecule_read_counts(m);
     fuzz_require(c.atoms == ovoid_molecule_atoms(m), "counts.atoms are the atoms");
     fuzz_require(c.unit_atoms == ovoid_molecule_unit_atoms(m), "counts.unit_atoms, too");
     fuzz_require(c.zero_radius <= c.unit_atoms && c.hydrogens <= c.unit_atoms &&

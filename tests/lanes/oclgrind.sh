@@ -15,7 +15,7 @@ if ! command -v oclgrind >/dev/null; then
 fi
 log=$(mktemp) || exit 1
 trap 'rm -f "$log"' EXIT
-export OVOID_DEVICE=Oclgrind OVOID_CACHE=off
+export OVOID_DEVICE=Oclgrind OVOID_CACHE=off OVOID_POOL=off
 oclgrind --build-options -cl-opt-disable --data-races --uninitialized --log "$log" \
     sh -c 'LD_PRELOAD="$0:$LD_PRELOAD" exec "$@"' "$buffers" "$@"
 status=$?

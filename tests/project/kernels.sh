@@ -20,13 +20,17 @@ check() {
     name=$1
     shift
     found=$((found + 1))
-    for shape in 16x1 8x1 4x1 1x16; do
+    # width x lanes x team
+    for shape in 16x1x1 8x1x1 4x1x1 1x16x32 1x16x64 1x2x2; do
+        lanes=${shape#*x}
+        team=${lanes#*x}
+        lanes=${lanes%x*}
         for file in "$folder/shared.h" "$folder/vector.clh" "$@"; do
             printf '#line 1 "%s"\n' "$file"
             cat "$file"
         done | "$clang" -target spir64 -x cl -cl-std=CL1.2 -Xclang -finclude-default-header \
-            -fsyntax-only -Wall -Wno-unused-function -Werror -DOV_PACK="$pack" -DOV_VECTOR="${shape%x*}" \
-            -DOV_LANES="${shape#*x}" - || {
+            -fsyntax-only -Wall -Wno-unused-function -Werror -DOV_PACK="$pack" -DOV_VECTOR="${shape%%x*}" \
+            -DOV_LANES="$lanes" -DOV_TEAM="$team" -DOV_SOLVE_GROUP="$team" - || {
             echo "$name fails in shape $shape"
             status=1
         }
@@ -37,6 +41,6 @@ for source in "$folder"/*.cl; do
     check "$source" "$source"
 done
 check "all of them" "$folder"/*.cl
-echo "$found programs in 4 shapes, with $clang"
+echo "$found programs in 6 shapes, with $clang"
 [ "$found" -gt 1 ] || status=1
 exit "$status"

@@ -4,7 +4,7 @@
 #ifndef REFERENCE_DISTANCE_H
 #define REFERENCE_DISTANCE_H
 
-#include "ovoid/surface.h"
+#include "ovoid/ovoid.h"
 
 /* Distance from a point to a triangle, by the region of the triangle's plane (corner, edge or
  * inside) that the point projects to. Degenerate triangles are edges or points. */

@@ -279,3 +279,21 @@ double reference_sparsity(const double *parameters, size_t ellipsoids) {
             sum += fabs(parameters[10 * i + j]);
     return sum;
 }
+
+void reference_gather(const uint32_t *list, size_t packs, size_t size, const float *all,
+                      float *some) {
+    for (size_t n = 0; n < packs; ++n)
+        for (size_t k = 0; k < size; ++k)
+            some[n * size + k] = all[list[n] * size + k];
+}
+
+void reference_scatter(const uint32_t *list, size_t packs, size_t size, const float *some,
+                       float *all) {
+    for (size_t n = 0; n < packs; ++n)
+        for (size_t k = 0; k < size; ++k)
+            all[list[n] * size + k] = some[n * size + k];
+}
+
+double reference_rest(double bound, double value) {
+    return fabs(bound) == (double)FLT_MAX ? bound : bound - value;
+}

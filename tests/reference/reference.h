@@ -48,6 +48,15 @@ void reference_gram(const ov_quadric *quadric, const double *xyz, const double *
  * face, an edge or a corner, and all 27 are tried. */
 double reference_least_exponent(const ov_quadric *quadric, const double box[6]);
 
+/* some = the `size` floats of each pack listed, of all; and back. */
+void reference_gather(const uint32_t *list, size_t packs, size_t size, const float *all,
+                      float *some);
+void reference_scatter(const uint32_t *list, size_t packs, size_t size, const float *some,
+                       float *all);
+
+/* What others leave of a bound (kernels/misfit.cl): FLT_MAX, which is none, stays. */
+double reference_rest(double bound, double value);
+
 /* phi of the paper's eq. 1.1. */
 double reference_phi(const double *xyzr, size_t atoms, double decay, const double y[3]);
 

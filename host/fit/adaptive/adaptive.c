@@ -206,7 +206,7 @@ static void tell(const ov_adaptive *f, size_t count, const ov_judgement *judgeme
     result->points = f->samples.points.count;
     result->ellipsoids = count;
     result->iterations = f->steps;
-    result->solver_iterations = ov_adaptive_solver_iterations(f) - f->solver_before;
+    result->adaptive.solver_iterations = ov_adaptive_solver_iterations(f) - f->solver_before;
     result->distance = judgement->valid && !is_coarse(f) ? judgement->deviation : NAN;
     result->verdict = verdict_of(f, count, judgement);
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
@@ -314,11 +314,12 @@ ovoid_status ov_adaptive_reach(ov_adaptive *f, const ovoid_fit_options *options,
                                const ov_found *start, double began, ov_found *found,
                                ovoid_fit_result *result) {
     ov_device *device;
+    uint64_t before[OVOID_COUNTS];
     ov_trial best = {0};
     ovoid_status status = ov_device_get(f->context, &device);
     if (status != OVOID_OK)
         return status;
-    const uint64_t launches = device->launches;
+    ov_device_counted(device, NULL, before);
     begin_search(f, options, start);
     OV_TRY(prepare(f));
     OV_TRY(ov_trial_create(f, &best));
@@ -329,7 +330,7 @@ cleanup:
     if (status == OVOID_ERROR_CANCELLED)
         rescue(f, found, result);
     if (status == OVOID_OK || status == OVOID_ERROR_CANCELLED)
-        result->profile.launches = device->launches - launches;
+        ov_device_counted(device, before, result->counts);
     ov_trial_destroy(&best);
     f->held = NULL;
     return status;

@@ -1,6 +1,5 @@
 #include "fit/adaptive/local.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -39,78 +38,45 @@ cleanup:
 
 /* ---- the points ------------------------------------------------------------------------------ */
 
-/* Lists the packs that those who move may reach; *kept of them. */
-static ovoid_status find_packs(ov_local *l, const ov_points *points, size_t *kept) {
+/* Lists the packs that those who move may reach. */
+static ovoid_status find_packs(ov_local *l, const ov_points *points) {
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = l->refiner.context;
-    OV_TRY(ov_grow(context, &l->packs, &l->packs_capacity, points->packs + 1, sizeof *l->packs,
-                   "packs"));
+    l->reached.terms_only = true;
     OV_TRY(ov_lists_build(context, &l->reached, points, &l->moving, 0.0));
-    OV_TRY(ov_buffer_read(context, &l->reached.pack_start, 0, l->packs,
-                          (points->packs + 1) * sizeof *l->packs));
-    *kept = 0;
-    for (uint32_t pack = 0; pack < points->packs; ++pack) /* in place: *kept <= pack */
-        if (l->packs[pack + 1] > l->packs[pack])
-            l->packs[(*kept)++] = pack;
+    OV_TRY(ov_grow(context, &l->packs.pack, &l->packs.capacity, l->reached.items,
+                   sizeof *l->packs.pack, "packs"));
+    OV_TRY(ov_buffer_read(context, &l->reached.term_item, 0, l->packs.pack,
+                          l->reached.items * sizeof *l->packs.pack));
+    l->packs.count = ov_packs_tidy(l->packs.pack, l->reached.items);
 cleanup:
-    return status;
-}
-
-/* Copies the packs listed: they lie along the same curve. */
-static ovoid_status keep_packs(ov_local *l, const ov_points *points, size_t kept) {
-    ovoid_status status = OVOID_OK;
-    ovoid_context *const context = l->refiner.context;
-    const size_t size = 3 * OV_PACK;
-    float *const packed = ov_alloc(context, points->packs * size, sizeof *packed, "points");
-    float *const origins = ov_alloc(context, kept * 4, sizeof *origins, "origins of packs");
-    free(l->points.pack_origin);
-    l->points.pack_origin = origins;
-    if (!packed || !origins) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    OV_TRY(ov_buffer_read(context, &points->xyz, 0, packed, points->packs * size * sizeof *packed));
-    for (size_t n = 0; n < kept; ++n) {
-        memmove(packed + n * size, packed + l->packs[n] * size, size * sizeof *packed);
-        memcpy(origins + 4 * n, points->pack_origin + 4 * (size_t)l->packs[n], 4 * sizeof *origins);
-    }
-    l->points.packs = kept;
-    l->points.count = kept * OV_PACK;
-    memcpy(l->points.origin, points->origin, sizeof points->origin);
-    OV_TRY(ov_points_upload(context, packed, &l->points));
-cleanup:
-    free(packed);
     return status;
 }
 
 /* ---- the target ------------------------------------------------------------------------------ */
 
-/* Whoever stays still leaves that much less of the target to the others. */
-static ovoid_status take_target(ov_local *l, const ov_target *target, size_t kept) {
+/* Fixed ellipsoids leave that much less of the target to the others. */
+static ovoid_status take_target(ov_local *l, const ov_target *target) {
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = l->refiner.context;
-    const size_t size = kept * OV_PACK;
-    float *const still = ov_alloc(context, 4 * size, sizeof *still, "targets at points");
-    if (!still)
-        return OVOID_ERROR_MEMORY;
-    float *const low = still + size, *const high = low + size, *const weight = high + size;
+    ov_kernel kernel = {0};
+    ov_device *device;
+    const cl_uint packs = (cl_uint)l->packs.count;
+    ov_target *const own = &l->target;
+    l->lists.packs_only = true;
+    OV_TRY(ov_device_get(context, &device));
+    OV_TRY(ov_kernel_create(context, "gather", "gather_target", &kernel));
     OV_TRY(ov_lists_build(context, &l->lists, &l->points, &l->still, 0.0));
     OV_TRY(ov_field(context, &l->refiner.operations, &l->points, &l->still, &l->lists, &l->value));
-    OV_TRY(ov_buffer_read(context, &l->value, 0, still, size * sizeof *still));
-    for (size_t k = 0; k < size; ++k) {
-        const size_t from = l->packs[k / OV_PACK] * (size_t)OV_PACK + k % OV_PACK;
-        low[k] = target->host_low[from] - still[k]; /* FLT_MAX stays what it is */
-        high[k] = target->host_high[from] - still[k];
-        weight[k] = target->host_weight[from] * target->emphasis[from];
-    }
-    OV_TRY(ov_buffer_put(context, &l->target.low, low, size * sizeof(float), "targets at points"));
-    OV_TRY(
-        ov_buffer_put(context, &l->target.high, high, size * sizeof(float), "targets at points"));
-    OV_TRY(ov_buffer_put(context, &l->target.weight, weight, size * sizeof(float),
-                         "targets at points"));
-    l->target.points = &l->points;
+    OV_TRY(ov_target_reserve(context, own, l->packs.count));
+    OV_TRY(OV_LAUNCH(context, &kernel, packs, ov_item_group(device), OV_ARG(packs),
+                     OV_ARG(l->list.memory), OV_ARG(target->low.memory),
+                     OV_ARG(target->high.memory), OV_ARG(target->weight.memory),
+                     OV_ARG(l->value.memory), OV_ARG(own->low.memory), OV_ARG(own->high.memory),
+                     OV_ARG(own->weight.memory)));
+    own->points = &l->points;
 cleanup:
-    free(still);
+    ov_kernel_destroy(&kernel);
     return status;
 }
 
@@ -148,18 +114,18 @@ static bool escaped(const double *x, size_t count, void *where) {
     return m->escaped;
 }
 
-/* Finds the points of those chosen and the target there, what the others leave of it; *kept: packs.
- */
+/* Finds the points of those chosen and the target there, what the others leave of it. */
 static ovoid_status find_part(ov_local *l, const ov_target *target, const double *x, size_t count,
-                              const bool *chosen, size_t *kept) {
+                              const bool *chosen) {
     ovoid_status status = OVOID_OK;
     OV_TRY(set_terms(l, target, x, count, chosen, true, REACH_SKIN, &l->moving));
-    OV_TRY(find_packs(l, target->points, kept));
-    if (*kept == 0)
+    OV_TRY(find_packs(l, target->points));
+    if (l->packs.count == 0)
         goto cleanup;
-    OV_TRY(keep_packs(l, target->points, *kept));
+    OV_TRY(ov_points_gather(l->refiner.context, target->points, l->packs.pack, l->packs.count,
+                            &l->list, &l->points));
     OV_TRY(set_terms(l, target, x, count, chosen, false, 0.0f, &l->still));
-    OV_TRY(take_target(l, target, *kept));
+    OV_TRY(take_target(l, target));
     ov_refiner_forget(&l->refiner);
 cleanup:
     return status;
@@ -172,13 +138,12 @@ static ovoid_status refine_movers(ov_local *l, const ov_target *target,
     ovoid_status status = OVOID_OK;
     ov_refine_options now = *options;
     const uint64_t before = l->refiner.steps;
-    size_t kept;
     now.enough = escaped;
     now.where = m;
     do {
         m->escaped = false;
-        OV_TRY(find_part(l, target, x, count, chosen, &kept));
-        if (kept == 0)
+        OV_TRY(find_part(l, target, x, count, chosen));
+        if (l->packs.count == 0)
             break;
         gather(x, count, chosen, m->x);
         gather(x, count, chosen, m->found);
@@ -226,6 +191,7 @@ void ov_local_destroy(ov_local *l) {
     ov_points_destroy(&l->points);
     ov_target_destroy(&l->target);
     ov_buffer_destroy(&l->value);
-    free(l->packs);
+    ov_buffer_destroy(&l->list);
+    ov_packs_destroy(&l->packs);
     memset(l, 0, sizeof *l);
 }

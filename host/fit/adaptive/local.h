@@ -11,13 +11,13 @@
 typedef struct ov_local {
     ov_refiner refiner; /* its context is set by who makes this */
     ov_terms moving, still;
-    ov_lists reached; /* of those that move, over all points */
-    ov_lists lists;   /* of those that stay still, over the points kept */
+    ov_lists reached; /* of those that move, over all points: their packs alone */
+    ov_lists lists;   /* of those that stay still, over the points kept: these alone */
     ov_points points; /* the packs that may be reached */
     ov_target target; /* of these, less the field of those that stay still */
     ov_buffer value;
-    uint32_t *packs; /* which of the whole target's they are */
-    size_t packs_capacity;
+    ov_packs packs; /* which of the whole target's they are */
+    ov_buffer list; /* the same on the device */
 } ov_local;
 
 /* As ov_refine() for the ellipsoids i of x with chosen[i]; count: of all. The misfit is that at the

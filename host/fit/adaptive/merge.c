@@ -129,13 +129,14 @@ static ovoid_status launch_losses(ov_refiner *r, ov_merger *m, const ov_target *
         OV_TRY(ov_kernel_create(r->context, "merge", "merge_loss", &m->kernel));
     OV_TRY(ov_buffer_reserve(r->context, &m->loss, listed * sizeof(cl_float), "losses"));
     const size_t lanes = device->shape.lanes;
-    OV_TRY(OV_LAUNCH(
-        r->context, &m->kernel, listed * lanes, lanes, OV_ARG(pairs), OV_ARG(m->pairs.memory),
-        OV_ARG(m->merged.device.memory), OV_ARG(target->points->xyz.memory),
-        OV_ARG(target->points->pack_origins.memory), OV_ARG(r->now.value.memory),
-        OV_ARG(target->low.memory), OV_ARG(target->high.memory), OV_ARG(target->weight.memory),
-        OV_ARG(r->now.lists.term_start.memory), OV_ARG(r->now.lists.term_item.memory),
-        OV_ARG(r->now.terms.device.memory), OV_ARG(m->loss.memory)));
+    OV_TRY(OV_LAUNCH(r->context, &m->kernel, listed * lanes, device->team, OV_ARG(pairs),
+                     OV_ARG(m->pairs.memory), OV_ARG(m->merged.device.memory),
+                     OV_ARG(target->points->xyz.memory),
+                     OV_ARG(target->points->pack_origins.memory), OV_ARG(r->now.value.memory),
+                     OV_ARG(target->low.memory), OV_ARG(target->high.memory),
+                     OV_ARG(target->weight.memory), OV_ARG(r->now.lists.term_start.memory),
+                     OV_ARG(r->now.lists.term_item.memory), OV_ARG(r->now.terms.device.memory),
+                     OV_ARG(m->loss.memory)));
 cleanup:
     return status;
 }

@@ -64,9 +64,7 @@ bool ov_adaptive_report(void *fit) {
                                      .iteration = f->steps,
                                      .ellipsoids = f->count,
                                      .points = f->samples.points.count,
-                                     .accuracy_term = f->misfit,
-                                     .accuracy_weight = 1.0,
-                                     .objective = f->misfit};
+                                     .adaptive.misfit = f->misfit};
     return ov_progress_report(f->context, &progress);
 }
 

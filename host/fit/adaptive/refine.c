@@ -89,18 +89,25 @@ cleanup:
     return status;
 }
 
+/* Sums that the kernel leaves. */
+static size_t sums_of(const ov_points *points) {
+    return (points->packs + OV_MISFIT_PACKS - 1) / OV_MISFIT_PACKS;
+}
+
 static ovoid_status launch_misfit(ov_refiner *r, ov_evaluation *e, const ov_target *target) {
     ovoid_status status = OVOID_OK;
     const cl_uint packs = (cl_uint)target->points->packs;
     const size_t bytes = packs * (size_t)OV_PACK * sizeof(cl_float);
+    const size_t sums = sums_of(target->points);
     ov_device *device;
     OV_TRY(ov_device_get(r->context, &device));
     if (!r->misfit.handle)
         OV_TRY(ov_kernel_create(r->context, "misfit", "misfit", &r->misfit));
     OV_TRY(ov_buffer_reserve(r->context, &e->u, bytes, "residuals"));
     OV_TRY(ov_buffer_reserve(r->context, &e->active, bytes, "weights"));
-    OV_TRY(ov_buffer_reserve(r->context, &e->sums, packs * sizeof(cl_float), "pack sums"));
-    OV_TRY(OV_LAUNCH(r->context, &r->misfit, packs, ov_item_group(device), OV_ARG(packs),
+    OV_TRY(ov_buffer_reserve(r->context, &e->sums, sums * sizeof(cl_float), "sums of packs"));
+    const size_t group = ov_item_group(device);
+    OV_TRY(OV_LAUNCH(r->context, &r->misfit, sums * group, group, OV_ARG(packs),
                      OV_ARG(e->value.memory), OV_ARG(target->low.memory),
                      OV_ARG(target->high.memory), OV_ARG(target->weight.memory),
                      OV_ARG(e->u.memory), OV_ARG(e->active.memory), OV_ARG(e->sums.memory)));
@@ -112,16 +119,17 @@ static ovoid_status evaluate(ov_refiner *r, ov_evaluation *e, const ov_target *t
                              const double *x, size_t count, double *misfit) {
     ovoid_status status = OVOID_OK;
     const ov_points *const points = target->points;
+    const size_t sums = sums_of(points);
     OV_TRY(make_room(r, count));
     OV_TRY(place(r, e, points, x, count));
     OV_TRY(ov_field(r->context, &r->operations, points, &e->terms, &e->lists, &e->value));
     OV_TRY(launch_misfit(r, e, target));
-    OV_TRY(ov_grow(r->context, &r->host, &r->host_capacity, points->packs, sizeof *r->host,
-                   "pack sums"));
-    OV_TRY(ov_buffer_read(r->context, &e->sums, 0, r->host, points->packs * sizeof *r->host));
+    OV_TRY(
+        ov_grow(r->context, &r->host, &r->host_capacity, sums, sizeof *r->host, "sums of packs"));
+    OV_TRY(ov_buffer_read(r->context, &e->sums, 0, r->host, sums * sizeof *r->host));
     *misfit = 0.0;
-    for (size_t pack = 0; pack < points->packs; ++pack)
-        *misfit += r->host[pack];
+    for (size_t k = 0; k < sums; ++k)
+        *misfit += r->host[k];
     ++r->evaluations;
 cleanup:
     return status;

@@ -1,7 +1,7 @@
 /*
  * One Levenberg-Marquardt step on the device: conjugate gradients on the damped normal equations,
- * matrix free (kernels/solve.cl). The host starts kernels and looks at the residual now and then;
- * vectors stay on the device until the step is read.
+ * matrix free (kernels/solve.cl). The host starts kernels, and looks at each residual while the
+ * next iteration runs, which it waits for the first time when it reads the step.
  */
 #ifndef OV_SOLVER_H
 #define OV_SOLVER_H
@@ -10,12 +10,15 @@
 #include "model/factor.h"
 
 typedef struct ov_solver {
-    ov_kernel start, product, update, direction;
+    ov_kernel start, product, update, direction, step;
     ov_buffer factor, block, diagonal, x, r, z, p, q, polynomial, rz, rz_next, pq;
     ov_buffer jacobian_p; /* weight * (J p) at the points */
     ov_buffer moments;    /* of it */
     float *host;          /* factors as uploaded, steps and sums as read back */
     size_t host_capacity;
+    size_t group;        /* ellipsoids in a work-group of many, */
+    size_t wide;         /* and work-items in the only one */
+    bool apart;          /* set by tests: as if there were many */
     uint64_t iterations; /* of conjugate gradients, all solves together */
 } ov_solver;
 

@@ -86,6 +86,16 @@ ovoid_status ov_target_window(ovoid_context *context, ov_target *target, double 
                          "targets at points");
 }
 
+ovoid_status ov_target_reserve(ovoid_context *context, ov_target *target, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    ov_buffer *const buffers[] = {&target->low, &target->high, &target->weight};
+    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+        OV_TRY(ov_buffer_reserve(context, buffers[k], packs * OV_PACK * sizeof(cl_float),
+                                 "targets at points"));
+cleanup:
+    return status;
+}
+
 ovoid_status ov_target_create(ovoid_context *context, const ov_samples *samples, double decay,
                               double isovalue, const ov_target_options *options,
                               ov_target *target) {
@@ -129,20 +139,6 @@ cleanup:
     return status;
 }
 
-/* The middle of a pack's box; returns the half of its diagonal. */
-static double middle_of(const ov_points *points, const float *xyz, size_t pack, double middle[3]) {
-    float box[6];
-    double square = 0.0;
-    ov_pack_box(xyz + pack * (3 * OV_PACK), box);
-    for (int axis = 0; axis < 3; ++axis) {
-        const double low = box[axis], high = box[axis + 3];
-        middle[axis] = points->origin[axis] + (double)points->pack_origin[4 * pack + (size_t)axis] +
-                       0.5 * (low + high);
-        square += (high - low) * (high - low);
-    }
-    return 0.5 * sqrt(square);
-}
-
 /* One more place is near the point. The field itself is asked for there, not a multiple of it: the
  * neck of a tunnel opens or closes with a percent of the field, and at a thousandth of the surface
  * the volume can do without it. */
@@ -152,48 +148,96 @@ static void emphasise_point(ov_target *target, size_t k, float factor) {
         target->host_low[k] = target->host_high[k] = target->phi[k];
 }
 
-/* Multiplies the emphasis of the points near the places of the grids: of the reach, and of twice
- * that, which tells most packs that no place is near any of their points. */
-static void emphasise(ov_target *target, const float *xyz, const ov_grid *grid, const ov_grid *wide,
-                      float factor) {
-    const ov_points *const points = target->points;
+/* Packs that places are near, with their points. */
+typedef struct neighbourhood {
+    ov_packs packs;
+    ov_buffer list; /* the same on the device */
+    ov_points points;
+    float *host; /* their coordinates, and then their targets: 3 * OV_PACK per pack */
+} neighbourhood;
+
+static void neighbourhood_destroy(neighbourhood *n) {
+    ov_packs_destroy(&n->packs);
+    ov_buffer_destroy(&n->list);
+    ov_points_destroy(&n->points);
+    free(n->host);
+}
+
+static ovoid_status find_neighbourhood(ovoid_context *context, const ov_points *points,
+                                       const double *places, size_t stride, size_t count,
+                                       double reach, neighbourhood *n) {
+    ovoid_status status = OVOID_OK;
+    for (size_t k = 0; k < count; ++k)
+        OV_TRY(ov_packs_near(context, points, (const double *)((const char *)places + k * stride),
+                             reach, &n->packs));
+    n->packs.count = ov_packs_tidy(n->packs.pack, n->packs.count);
+    if (n->packs.count == 0)
+        return OVOID_OK;
+    const size_t floats = n->packs.count * 3 * OV_PACK;
+    n->host = ov_alloc(context, floats, sizeof *n->host, "points");
+    if (!n->host)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_points_gather(context, points, n->packs.pack, n->packs.count, &n->list, &n->points));
+    OV_TRY(ov_buffer_read(context, &n->points.xyz, 0, n->host, floats * sizeof *n->host));
+cleanup:
+    return status;
+}
+
+/* Multiplies the emphasis of the points near the grid's places. The targets of each pack take the
+ * place of its coordinates. */
+static void emphasise(ov_target *target, const ov_grid *grid, float factor, neighbourhood *n) {
     uint32_t near[2 * OV_NEAR_MAX];
     double at[3];
-    for (size_t pack = 0; pack < points->packs; ++pack) {
-        if (middle_of(points, xyz, pack, at) <= grid->reach &&
-            ov_grid_near(wide, at, UINT32_MAX, near) == 0)
-            continue;
-        for (size_t k = pack * OV_PACK; k < (pack + 1) * OV_PACK; ++k) {
-            ov_points_at(points, xyz, k, at);
+    for (size_t k = 0; k < n->packs.count; ++k) {
+        const size_t first = n->packs.pack[k] * (size_t)OV_PACK;
+        float *const some = n->host + k * (3 * OV_PACK);
+        for (size_t j = 0; j < OV_PACK; ++j) {
+            ov_points_at(&n->points, n->host, k * OV_PACK + j, at);
             if (ov_grid_near(grid, at, UINT32_MAX, near) > 0)
-                emphasise_point(target, k, factor);
+                emphasise_point(target, first + j, factor);
+        }
+        for (size_t j = 0; j < OV_PACK; ++j) {
+            some[j] = target->host_low[first + j];
+            some[OV_PACK + j] = target->host_high[first + j];
+            some[2 * OV_PACK + j] = target->host_weight[first + j] * target->emphasis[first + j];
         }
     }
+}
+
+static ovoid_status scatter(ovoid_context *context, ov_target *target, neighbourhood *n) {
+    ovoid_status status = OVOID_OK;
+    ov_kernel kernel = {0};
+    ov_device *device;
+    const cl_uint packs = (cl_uint)n->packs.count;
+    OV_TRY(ov_device_get(context, &device));
+    OV_TRY(ov_kernel_create(context, "gather", "scatter_target", &kernel));
+    OV_TRY(ov_buffer_write(context, &n->points.xyz, 0, n->host,
+                           n->packs.count * 3 * OV_PACK * sizeof *n->host));
+    OV_TRY(OV_LAUNCH(context, &kernel, packs, ov_item_group(device), OV_ARG(packs),
+                     OV_ARG(n->list.memory), OV_ARG(n->points.xyz.memory),
+                     OV_ARG(target->low.memory), OV_ARG(target->high.memory),
+                     OV_ARG(target->weight.memory)));
+cleanup:
+    ov_kernel_destroy(&kernel);
+    return status;
 }
 
 ovoid_status ov_target_emphasise(ovoid_context *context, ov_target *target, const double *places,
                                  size_t stride, size_t count, double reach, double factor) {
     ovoid_status status = OVOID_OK;
-    const size_t size = target->points->packs * OV_PACK;
-    ov_grid grid = {0}, wide = {0};
+    ov_grid grid = {0};
+    neighbourhood n = {0};
     if (count == 0)
         return OVOID_OK;
-    float *const xyz = ov_alloc(context, 3 * size, sizeof *xyz, "points");
-    if (!xyz)
-        return OVOID_ERROR_MEMORY;
+    OV_TRY(find_neighbourhood(context, target->points, places, stride, count, reach, &n));
+    if (n.packs.count == 0)
+        goto cleanup;
     OV_TRY(ov_grid_of(context, places, stride, count, reach, &grid));
-    OV_TRY(ov_grid_of(context, places, stride, count, 2.0 * reach, &wide));
-    OV_TRY(ov_buffer_read(context, &target->points->xyz, 0, xyz, 3 * size * sizeof *xyz));
-    emphasise(target, xyz, &grid, &wide, (float)factor);
-    for (size_t k = 0; k < size; ++k)
-        xyz[k] = target->host_weight[k] * target->emphasis[k];
-    OV_TRY(ov_buffer_write(context, &target->weight, 0, xyz, size * sizeof *xyz));
-    OV_TRY(ov_buffer_write(context, &target->low, 0, target->host_low, size * sizeof(float)));
-    OV_TRY(ov_buffer_write(context, &target->high, 0, target->host_high, size * sizeof(float)));
+    emphasise(target, &grid, (float)factor, &n);
+    OV_TRY(scatter(context, target, &n));
 cleanup:
     ov_grid_destroy(&grid);
-    ov_grid_destroy(&wide);
-    free(xyz);
+    neighbourhood_destroy(&n);
     return status;
 }
 

@@ -39,6 +39,9 @@ ovoid_status ov_target_create(ovoid_context *context, const ov_samples *samples,
                               double isovalue, const ov_target_options *options, ov_target *target);
 void ov_target_destroy(ov_target *target);
 
+/* Makes room on the device for low, high and weight of so many packs. */
+ovoid_status ov_target_reserve(ovoid_context *context, ov_target *target, size_t packs);
+
 /* Weights the residuals by another window; emphasis is forgotten. */
 ovoid_status ov_target_window(ovoid_context *context, ov_target *target, double window,
                               double floor);

@@ -91,6 +91,15 @@ static double first_step(const fit *f, size_t size, double largest) {
     return fmin(step, FIRST_CHANGE_MAX / largest);
 }
 
+/* A trial too far out to be a model, or to have a finite field, is as good as rejected. */
+static ovoid_status evaluate_trial(fit *f, ov_l1_evaluation *tried) {
+    const ovoid_status status = ov_l1_evaluate(&f->objective, f->trial, f->count, tried);
+    if (status != OVOID_ERROR_NUMERIC)
+        return status;
+    *tried = (ov_l1_evaluation){.accuracy = INFINITY, .max_error = INFINITY};
+    return OVOID_OK;
+}
+
 /* Steps 5.7 and 5.8: backtracking along -grad f until f falls by armijo * tau * |grad f|^2. On
  * success the trial becomes x and *now its evaluation; *tau is 0 where no step was found. */
 static ovoid_status line_search(fit *f, ov_l1_weights w, ov_l1_evaluation *now, double *tau) {
@@ -112,7 +121,7 @@ static ovoid_status line_search(fit *f, ov_l1_weights w, ov_l1_evaluation *now, 
         for (size_t j = 0; j < size; ++j)
             f->trial[j] = f->x[j] - step * f->gradient[j];
         ov_l1_evaluation tried;
-        OV_TRY(ov_l1_evaluate(&f->objective, f->trial, f->count, &tried));
+        OV_TRY(evaluate_trial(f, &tried));
         const double after = w.accuracy * tried.accuracy +
                              w.sparse * ov_l1_sparse_term(&f->objective, f->trial, f->count);
         if (after <= before - l1->armijo * step * square) {
@@ -140,13 +149,13 @@ static bool report(const fit *f, uint64_t iteration, bool accuracy_phase, ov_l1_
         .iterations = f->options->l1.iterations,
         .ellipsoids = f->count,
         .points = f->objective.samples->points.count,
-        .accuracy_term = now.accuracy,
-        .sparse_term = sparse,
-        .accuracy_weight = w.accuracy,
-        .sparse_weight = w.sparse,
-        .objective = w.accuracy * now.accuracy + w.sparse * sparse,
-        .max_error = now.max_error,
-        .step = tau,
+        .l1 = {.accuracy_term = now.accuracy,
+               .sparse_term = sparse,
+               .accuracy_weight = w.accuracy,
+               .sparse_weight = w.sparse,
+               .objective = w.accuracy * now.accuracy + w.sparse * sparse,
+               .max_error = now.max_error,
+               .step = tau},
     };
     return ov_progress_report(f->objective.context, &progress);
 }
@@ -281,9 +290,9 @@ static void tell(const fit *f, ovoid_fit_result *result) {
     result->points = f->objective.samples->points.count;
     result->ellipsoids = f->count;
     result->iterations = f->iterations;
-    result->rms_error = f->known ? sqrt(f->now.accuracy / points) : NAN;
-    result->max_error = f->known ? f->now.max_error : NAN;
-    result->profile = f->objective.profile;
+    result->l1 = f->objective.profile;
+    result->l1.rms_error = f->known ? sqrt(f->now.accuracy / points) : NAN;
+    result->l1.max_error = f->known ? f->now.max_error : NAN;
 }
 
 ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
@@ -291,9 +300,10 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                        ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
+    uint64_t before[OVOID_COUNTS];
     fit f = {.options = options, .count = atoms};
     OV_TRY(ov_device_get(context, &device));
-    const uint64_t launches = device->launches;
+    ov_device_counted(device, NULL, before);
     OV_TRY(allocate(&f, context, samples));
     initialise(&f, xyzr);
     status = iterate(&f);
@@ -304,7 +314,7 @@ ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
         goto cleanup;
     }
     tell(&f, result);
-    result->profile.launches = device->launches - launches;
+    ov_device_counted(device, before, result->counts);
 cleanup:
     destroy(&f);
     return status;

@@ -66,14 +66,17 @@ static ovoid_status refresh_lists(ov_l1_objective *objective, const double *x, s
         return OVOID_OK;
     const double start = ov_seconds();
     adapt_skin(objective, count);
+    objective->listed_count = 0; /* until the lists are whole again */
     const ovoid_status status =
         ov_lists_build(objective->context, &objective->lists, &objective->samples->points,
                        &objective->terms, objective->skin);
+    if (status != OVOID_OK)
+        return status;
     memcpy(objective->listed, x, count * OV_L1_PARAMETERS * sizeof *x);
     objective->listed_count = count;
     objective->profile.lists_seconds += ov_seconds() - start;
     ++objective->profile.list_builds;
-    return status;
+    return OVOID_OK;
 }
 
 ovoid_status ov_l1_evaluate(ov_l1_objective *objective, const double *x, size_t count,

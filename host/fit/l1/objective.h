@@ -34,7 +34,7 @@ typedef struct ov_l1_objective {
     ov_lists lists;
     ov_operations operations;
     ov_buffer value, residual, pack_sums, moment_sums;
-    ovoid_fit_profile profile;
+    ovoid_l1_result profile; /* its seconds and counts */
 } ov_l1_objective;
 
 /* Room for up to `ellipsoids` of them. Samples with phi > limit only ask that phi~ does not fall
@@ -45,8 +45,8 @@ ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *sa
 void ov_l1_objective_destroy(ov_l1_objective *objective);
 
 /* phi~ and the residual at all points for the parameters x, OV_L1_PARAMETERS per ellipsoid. The
- * residual stays on the device, for ov_l1_gradient(). OVOID_ERROR_NUMERIC when E_s is not finite.
- */
+ * residual stays on the device, for ov_l1_gradient(). OVOID_ERROR_NUMERIC when x is no model or E_s
+ * is not finite. After a failure the objective can be evaluated again. */
 ovoid_status ov_l1_evaluate(ov_l1_objective *objective, const double *x, size_t count,
                             ov_l1_evaluation *result);
 

@@ -1,0 +1,66 @@
+/* The layouts that the headers promise to bindings. */
+#include "ovoid/ovoid.h"
+
+#include <assert.h>
+
+#define PROMISED(type, bytes) static_assert(sizeof(type) == (bytes), #type " has changed")
+#define AT(type, member, offset)                                                                   \
+    static_assert(offsetof(type, member) == (offset), #type "." #member " has moved")
+
+PROMISED(ovoid_ellipsoid, 10 * sizeof(double));
+AT(ovoid_ellipsoid, amplitude, 0);
+AT(ovoid_ellipsoid, decay, 1 * sizeof(double));
+AT(ovoid_ellipsoid, centre, 4 * sizeof(double));
+AT(ovoid_ellipsoid, angle, 7 * sizeof(double));
+
+PROMISED(ovoid_atom, 24);
+AT(ovoid_atom, element, 8);
+AT(ovoid_atom, altloc, 11);
+AT(ovoid_atom, serial, 12);
+AT(ovoid_atom, residue, 16);
+AT(ovoid_atom, flags, 20);
+
+PROMISED(ovoid_residue, 32);
+AT(ovoid_residue, chain, 8);
+AT(ovoid_residue, number, 20);
+AT(ovoid_residue, insertion, 24);
+AT(ovoid_residue, first, 28);
+
+PROMISED(ovoid_placement, 112);
+AT(ovoid_placement, translation, 72);
+AT(ovoid_placement, part, 96);
+AT(ovoid_placement, first, 104);
+
+PROMISED(ovoid_guess, 40);
+AT(ovoid_guess, radius, 24);
+PROMISED(ovoid_assembly_info, 32);
+AT(ovoid_assembly_info, placements, 16);
+
+PROMISED(ovoid_component, 48);
+AT(ovoid_component, area, 16);
+AT(ovoid_component, outer, 32);
+AT(ovoid_component, euler, 36);
+AT(ovoid_component, closed, 40);
+
+PROMISED(ovoid_distances, 5 * sizeof(double));
+PROMISED(ovoid_pair, 3 * sizeof(double));
+PROMISED(ovoid_l1_options, 80);
+PROMISED(ovoid_adaptive_options, 48);
+PROMISED(ovoid_l1_progress, 7 * sizeof(double));
+PROMISED(ovoid_adaptive_progress, sizeof(double));
+PROMISED(ovoid_l1_result, 72);
+PROMISED(ovoid_adaptive_result, 8);
+PROMISED(ovoid_kernel_time, sizeof(const char *) + 16);
+
+/* Structures that grow begin with their size. */
+AT(ovoid_read_options, size, 0);
+AT(ovoid_molecule_counts, size, 0);
+AT(ovoid_device_info, size, 0);
+AT(ovoid_progress, size, 0);
+AT(ovoid_fit_options, size, 0);
+AT(ovoid_fit_result, size, 0);
+AT(ovoid_mesh_options, size, 0);
+AT(ovoid_measure_options, size, 0);
+AT(ovoid_measures, size, 0);
+AT(ovoid_export_options, size, 0);
+AT(ovoid_picture_options, size, 0);

@@ -1,0 +1,70 @@
+/*
+ * Models and fields for other programs.
+ */
+#ifndef OVOID_EXPORT_H
+#define OVOID_EXPORT_H
+
+#include "ovoid/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Files for other programs. Ellipsoids, of models alone: */
+typedef enum ovoid_export_format {
+    OVOID_EXPORT_AUTO = 0, /* by the extension */
+    OVOID_EXPORT_BILD,     /* .bild, .bld: ChimeraX, one object of coarse ellipsoids */
+    OVOID_EXPORT_CXC,      /* .cxc: ChimeraX commands, each ellipsoid a smooth surface of its own */
+    OVOID_EXPORT_PYMOL,    /* .py: a script that loads the ellipsoids into PyMOL */
+    OVOID_EXPORT_GMM,      /* .gmm: the Gaussian mixture text of gmconvert and gmfit */
+    OVOID_EXPORT_JSON,     /* .json */
+    /* and the field on a lattice, of models and molecules: */
+    OVOID_EXPORT_CCP4, /* .mrc, .map, .ccp4: MRC2014, 32-bit floats */
+    OVOID_EXPORT_DX    /* .dx: OpenDX text as APBS writes it */
+} ovoid_export_format;
+
+typedef struct ovoid_export_options {
+    size_t size;
+    ovoid_export_format format;
+    /* c. An ellipsoid is drawn where its own Gaussian is c: with semi-axes sqrt(ln(a / c) / d_p).
+     * One that nowhere reaches c (a <= c) is drawn where it has half its amplitude, with semi-axes
+     * sqrt(ln 2 / d_p). A map reaches to where each Gaussian has fallen to c / 100. 0: the model's,
+     * or OVOID_DEFAULT_ISOVALUE of a molecule. */
+    double isovalue;
+    double spacing;       /* of a map, angstrom; its points are multiples of it */
+    double colour[3];     /* red, green, blue from 0 to 1, of drawn ellipsoids */
+    double opacity;       /* from 0 to 1, of drawn ellipsoids */
+    double max_gigabytes; /* a map that would take more (1e9 bytes each) is refused */
+} ovoid_export_options;
+
+#define OVOID_DEFAULT_MAP_GIGABYTES 1.0
+
+/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue, maps of up
+ * to OVOID_DEFAULT_MAP_GIGABYTES; size is sizeof *options. */
+OVOID_API void ovoid_export_options_init(ovoid_export_options *options, size_t size);
+
+/* Writes a file for another program, whole or not at all; "-" is standard output and needs a
+ * format. options may be NULL. OVOID_ERROR_ARGUMENT where the path's extension stands for another
+ * format than the options name. A map is computed on the device and written piece by piece: memory
+ * does not grow with it; OVOID_ERROR_LIMIT, before anything is computed, where it would take more
+ * than max_gigabytes. */
+OVOID_API ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model,
+                                          const char *path, const ovoid_export_options *options);
+
+/* As ovoid_model_export(), for the field of a molecule: maps alone. */
+OVOID_API ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
+                                             double decay, const char *path,
+                                             const ovoid_export_options *options);
+
+/* Name of a format as ovoid_export_format_find() takes it, "bild" for example; NULL for others. */
+OVOID_API const char *ovoid_export_format_name(ovoid_export_format format);
+
+/* The format of a name ("ccp4") or an extension ("mrc", with its dot or without), in any case of
+ * letters; AUTO when there is none. */
+OVOID_API ovoid_export_format ovoid_export_format_find(const char *name);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,172 @@
+/*
+ * Fitting a model to the surface of a molecule.
+ */
+#ifndef OVOID_FIT_H
+#define OVOID_FIT_H
+
+#include "ovoid/model.h"
+#include "ovoid/molecule.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Of the constrained points, angstrom. */
+#define OVOID_DEFAULT_SPACING_ADAPTIVE                                                             \
+    0.7                               /* less for molecules of less than 640 atoms, and times      \
+                                         sqrt(0.5 / decay) for decays above 0.5 */
+#define OVOID_DEFAULT_SPACING_L1 1.25 /* bench/l1_settings.py says why */
+
+typedef enum ovoid_method {
+    OVOID_METHOD_ADAPTIVE = 0, /* merges the atoms' Gaussians, then fits what is left to the
+                                  surface: fewer ellipsoids, nearer to it, in a fraction of the
+                                  time */
+    OVOID_METHOD_L1            /* the paper's Algorithm 1 */
+} ovoid_method;
+
+/* What each atom's Gaussian may become. */
+typedef enum ovoid_kernel {
+    OVOID_KERNEL_ELLIPSOID = 0, /* the paper's model: all ten parameters move, E_l1 is eq. 3.3 */
+    OVOID_KERNEL_SPHERE /* the "sparse RBF" model that Table 1 compares with: spheres of decay d
+                           at the atoms, only amplitudes move, E_l1 is sum_i |c_i| */
+} ovoid_kernel;
+
+/* The step that the line search tries first (open in the paper, which asks for an inexact search
+ * along the negative gradient). */
+typedef enum ovoid_first_step {
+    OVOID_FIRST_STEP_SECANT = 0, /* Barzilai and Borwein's, where the last two gradients are of E_s
+                                    alone; else as GROW */
+    OVOID_FIRST_STEP_GROW        /* grow times the last accepted step */
+} ovoid_first_step;
+
+/* Constants of the paper's Algorithm 1. Those marked "open" are not given in the paper. */
+typedef struct ovoid_l1_options { /* 80 bytes */
+    ovoid_kernel kernel;          /* ELLIPSOID */
+    uint32_t iterations;          /* MaxNiter: 8000 (section 4.1, ADP) */
+    uint32_t sparse_iterations;   /* SparseNiter: 6000 (section 4.1, ADP) */
+    uint32_t inside_every;        /* beyond the paper: of the lattice points with phi > c + 1, those
+                                     whose three indices are multiples of this hold the inside, where
+                                     phi~ is not to fall below c + 1: their residual is
+                                     min(phi~ - (c + 1), 0). 0: none, the paper's text taken
+                                     literally */
+    double epsilon;               /* lower bound of w_s in step 5.4 (open) */
+    double max_error;             /* gate of step 5.5: 0.5 */
+    double prune_below;           /* tol of step 5.1: |c~| under it is deleted: 1e-3 */
+    uint32_t prune_every;         /* iterations between deletions: 20 */
+    ovoid_first_step first_step;  /* of the line search (open): SECANT */
+    double armijo;                /* sufficient decrease of the line search (open): 1e-4 */
+    double shrink;                /* factor of a rejected step (open): 0.5 */
+    double grow;                  /* of the last accepted step, for the next first one (open): 2 */
+    uint32_t max_backtracks;      /* trial steps of one search before giving up (open): 30 */
+} ovoid_l1_options;
+
+/* What the adaptive method is to reach. */
+typedef enum ovoid_goal {
+    OVOID_GOAL_TOLERANCE = 0, /* the outer surfaces are nowhere further apart than `tolerance`, with
+                                 as few ellipsoids as it finds */
+    OVOID_GOAL_ELLIPSOIDS,    /* `ellipsoids` of them */
+    OVOID_GOAL_RATIO          /* `ratio` ellipsoids per atom, at least one */
+} ovoid_goal;
+
+/* Half an angstrom: what an atom of a well-ordered crystal moves by itself (B = 20 angstrom^2 is a
+ * root mean square displacement of 0.5 angstrom along each axis). */
+#define OVOID_DEFAULT_TOLERANCE 0.5
+
+typedef struct ovoid_adaptive_options { /* 48 bytes */
+    ovoid_goal goal;                    /* TOLERANCE */
+    double tolerance;                   /* angstrom: OVOID_DEFAULT_TOLERANCE */
+    uint32_t ellipsoids;                /* for OVOID_GOAL_ELLIPSOIDS; more than atoms is an error */
+    double ratio;                       /* for OVOID_GOAL_RATIO, at most 1 */
+    uint32_t effort;     /* 1 (the default) to 10: how many starts and repairs are tried */
+    uint32_t steps;      /* Levenberg-Marquardt steps of one refinement at most: 60; 0 leaves the
+                            merged Gaussians as they are */
+    double mesh_spacing; /* of the meshes that surfaces are judged on, angstrom: 0.5 */
+} ovoid_adaptive_options;
+
+typedef struct ovoid_fit_options {
+    size_t size;
+    ovoid_method method;
+    double decay;    /* d, angstrom^-2 */
+    double isovalue; /* c */
+    double spacing;  /* of the lattice of constrained points, angstrom (open); 0: the method's own,
+                        OVOID_DEFAULT_SPACING_... */
+    double padding;  /* of the box about the atom centres, angstrom (open); adaptive takes what the
+                        field needs, if that is more */
+    ovoid_adaptive_options adaptive;
+    ovoid_l1_options l1;
+} ovoid_fit_options;
+
+/* Whether the goal of method adaptive was reached, and if not, why. */
+typedef enum ovoid_verdict {
+    OVOID_VERDICT_REACHED = 0,
+    OVOID_VERDICT_MISSED, /* measured, and further apart than asked; or not so many ellipsoids */
+    OVOID_VERDICT_NO_SURFACE, /* there is none to be near to: the molecule's field is nowhere above
+                                 the isovalue at the lattice points. The model follows the field
+                                 then */
+    OVOID_VERDICT_NO_MODEL_SURFACE, /* the model has none */
+    OVOID_VERDICT_COARSE, /* mesh_spacing is above both the tolerance and 2 / sqrt(2 decay), or
+                            parts of the surface are too small for it: nothing that was measured
+                            would tell */
+    OVOID_VERDICT_NO_GOAL /* method l1 has none */
+} ovoid_verdict;
+
+/* What method l1 tells of a fit, beyond what both do. The seconds are measured on the host between
+ * waits for the device, so they include launches. */
+typedef struct ovoid_l1_result { /* 72 bytes */
+    double rms_error;            /* sqrt(E_s / points) */
+    double max_error;            /* max_k |phi~ - phi| over the constrained points */
+    double lists_seconds;        /* building the pack lists */
+    double field_seconds;        /* phi~ and the residual, including every trial step */
+    double moments_seconds;      /* sums for the gradient */
+    double host_seconds;         /* parameter updates and the chain rule */
+    uint64_t list_builds;
+    uint64_t field_passes;
+    uint64_t moments_passes;
+} ovoid_l1_result;
+
+/* What method adaptive tells of a fit, beyond what both do. It waits for the device too seldom for
+ * times of its parts: ovoid_context_profile() tells those of kernels. */
+typedef struct ovoid_adaptive_result { /* 8 bytes */
+    uint64_t solver_iterations;        /* of conjugate gradients */
+} ovoid_adaptive_result;
+
+typedef struct ovoid_fit_result {
+    size_t size;
+    ovoid_method method;
+    double spacing;  /* of the constrained points, angstrom: what was asked for or the default */
+    uint64_t points; /* constrained points */
+    uint64_t ellipsoids;
+    uint64_t iterations; /* done */
+    bool reached; /* the goal, as measured: verdict is OVOID_VERDICT_REACHED, or there is none */
+    ovoid_verdict verdict;
+    double distance; /* largest between the outer surfaces, measured, angstrom: right to 1e-7 of the
+                        molecule's half extent; NAN where it was not measured (l1, no surface, or
+                        too coarse a mesh) */
+    double sample_seconds;
+    double fit_seconds;
+    ovoid_l1_result l1;             /* of method l1, else NAN and OVOID_UNKNOWN */
+    ovoid_adaptive_result adaptive; /* of method adaptive, else OVOID_UNKNOWN */
+    uint64_t counts[OVOID_COUNTS];  /* by ovoid_count: what the fit made of them, of l1 without
+                                       sampling */
+} ovoid_fit_result;
+
+/* Nothing known; size is sizeof *result. */
+OVOID_API void ovoid_fit_result_init(ovoid_fit_result *result, size_t size);
+
+/* Fills in the defaults; size is sizeof *options. */
+OVOID_API void ovoid_fit_options_init(ovoid_fit_options *options, size_t size);
+
+/* Fits a model to a molecule's surface on the opened device (opening the default one if none is).
+ * The same input, options, device and driver give the same bits. result may be NULL, else it was
+ * made by ovoid_fit_result_init(). A fit that the progress callback stops (OVOID_ERROR_CANCELLED)
+ * hands over the best model that held by then, or sets *model to NULL, as ovoid_fitter_reach()
+ * does. For more than one fit of a molecule make an ovoid_fitter (fitter.h). */
+OVOID_API ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
+                                 const ovoid_fit_options *options, ovoid_model **model,
+                                 ovoid_fit_result *result);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,60 @@
+/*
+ * How well a model stands for a molecule: areas, volumes and distances.
+ */
+#ifndef OVOID_MEASURE_H
+#define OVOID_MEASURE_H
+
+#include "ovoid/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct ovoid_pair { /* 24 bytes */
+    double original;        /* of the molecule */
+    double sparse;          /* of the model */
+    double error;           /* |sparse - original| / original */
+} ovoid_pair;
+
+typedef struct ovoid_measure_options {
+    size_t size;
+    double isovalue;
+    double spacing; /* of both meshes, angstrom */
+    ovoid_vertex_rule vertices;
+    bool distances; /* also compute distances */
+} ovoid_measure_options;
+
+typedef struct ovoid_measures {
+    size_t size;
+    ovoid_pair area; /* of the whole surfaces, angstrom^2: smooth with exact vertices, flat with */
+    ovoid_pair volume;     /* linear ones; volume in angstrom^3 */
+    ovoid_pair area_outer; /* of the outer components alone */
+    ovoid_pair volume_outer;
+    uint64_t components_original, components_sparse; /* connected pieces */
+    uint64_t outer_original, outer_sparse;           /* of these, outer ones */
+    ovoid_distances distances;
+    ovoid_distances distances_outer;
+    double deviation; /* largest distance of a vertex of either outer surface from the other whole
+                         surface, angstrom: unlike the Hausdorff distance of the outer surfaces it
+                         does not jump when the neck of a tunnel opens or closes, and unlike that of
+                         the whole ones not with a small cavity. What a tolerance is about. */
+    double seconds_mesh, seconds_distances;
+} ovoid_measures;
+
+/* isovalue 1, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices, with distances; size is sizeof
+ * *options. */
+OVOID_API void ovoid_measure_options_init(ovoid_measure_options *options, size_t size);
+
+/* Nothing known; size is sizeof *measures. */
+OVOID_API void ovoid_measures_init(ovoid_measures *measures, size_t size);
+
+/* Meshes both surfaces on the same lattice and compares them. decay is that of the model. */
+OVOID_API ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecule,
+                                     const ovoid_model *model, const ovoid_measure_options *options,
+                                     ovoid_measures *measures);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -144,6 +144,7 @@ static void compare(const setting *s, errors *e) {
 }
 
 static void evaluate(ovoid_context *context, setting *s, bool spheres) {
+    ovoid_field *field = NULL;
     if (spheres) {
         ovoid_molecule *molecule = NULL;
         double *const xyzr = need(4 * COUNT, sizeof *xyzr);
@@ -152,16 +153,17 @@ static void evaluate(ovoid_context *context, setting *s, bool spheres) {
             xyzr[4 * i + 3] = sqrt(log(s->members[i].amplitude) / DECAY);
         }
         check(context, ovoid_molecule_create(context, xyzr, COUNT, &molecule));
-        check(context, ovoid_molecule_field(context, molecule, DECAY, s->xyz, POINTS, s->value,
-                                            s->gradient));
+        check(context, ovoid_field_of_molecule(context, molecule, DECAY, 1.0, &field));
         ovoid_molecule_destroy(&molecule);
         free(xyzr);
     } else {
         ovoid_model *model = NULL;
         check(context, ovoid_model_create(context, s->members, COUNT, DECAY, 1.0, &model));
-        check(context, ovoid_model_field(context, model, s->xyz, POINTS, s->value, s->gradient));
+        check(context, ovoid_field_of_model(context, model, &field));
         ovoid_model_destroy(&model);
     }
+    check(context, ovoid_field_evaluate(context, field, s->xyz, POINTS, s->value, s->gradient));
+    ovoid_field_destroy(&field);
 }
 
 static int ascending(const void *a, const void *b) {

@@ -12,6 +12,87 @@
  * filled up with its last triangle.
  */
 
+/* ---- making leaves ------------------------------------------------------------------------ */
+
+/* a b - c d, as near as a float comes (Kahan): of needles' normals, the rest is all rounding. */
+static inline float ov_minor(float a, float b, float c, float d) {
+    const float cd = c * d;
+    return fma(a, b, -cd) + fma(-c, d, cd);
+}
+
+static inline void ov_cross(const float *a, const float *b, float *result) {
+    result[0] = ov_minor(a[1], b[2], a[2], b[1]);
+    result[1] = ov_minor(a[2], b[0], a[0], b[2]);
+    result[2] = ov_minor(a[0], b[1], a[1], b[0]);
+}
+
+static inline float ov_square(const float *a) {
+    return fma(a[0], a[0], fma(a[1], a[1], a[2] * a[2]));
+}
+
+static inline float ov_inverse(float square) {
+    return square > 0.0f ? min(1.0f / square, FLT_MAX) : 0.0f;
+}
+
+/* A triangle whose height is below this share of its sides is flat: its edges are all of it. */
+#define FLAT 1e-12f /* squared */
+
+/* Edges and their duals are those of the corners rounded to floats, so that what a point is held
+ * against is what the mesh's own points are. to: of a leaf, from the triangle's place on. */
+static inline void ov_put_triangle(const float *p, const float *u, const float *v,
+                                   __global float *to) {
+    float normal[3], g[3], h[3], across[3];
+    for (uint k = 0; k < 3; ++k)
+        across[k] = v[k] - u[k];
+    ov_cross(u, v, normal);
+    ov_cross(v, normal, g);
+    ov_cross(normal, u, h);
+    const float uu = ov_square(u), vv = ov_square(v), determinant = ov_square(normal);
+    const int flat = !(determinant > FLAT * uu * vv);
+    for (uint k = 0; k < 3; ++k) {
+        to[k * OV_LEAF] = p[k];
+        to[(3 + k) * OV_LEAF] = u[k];
+        to[(6 + k) * OV_LEAF] = v[k];
+        to[(9 + k) * OV_LEAF] = flat ? 0.0f : g[k] / determinant;
+        to[(12 + k) * OV_LEAF] = flat ? 0.0f : h[k] / determinant;
+    }
+    to[15 * OV_LEAF] = ov_inverse(uu);
+    to[16 * OV_LEAF] = ov_inverse(vv);
+    to[17 * OV_LEAF] = ov_inverse(ov_square(across));
+}
+
+/* The leaves of `triangles` triangles, three corners each, and the box about each leaf: low x, y,
+ * z, high x, y, z. xyz: of the vertices. */
+__kernel void pack_leaves(const uint leaves, const uint triangles,
+                          __global const uint *restrict corners, __global const float *restrict xyz,
+                          __global float *restrict packed, __global float *restrict boxes) {
+    const uint leaf = get_global_id(0);
+    if (leaf >= leaves)
+        return;
+    float low[3] = {FLT_MAX, FLT_MAX, FLT_MAX}, high[3] = {-FLT_MAX, -FLT_MAX, -FLT_MAX};
+    for (uint j = 0; j < OV_LEAF; ++j) {
+        __global const uint *const corner =
+            corners + 3 * (size_t)min(leaf * OV_LEAF + j, triangles - 1);
+        float p[3], u[3], v[3];
+        for (uint k = 0; k < 3; ++k) {
+            const float a = xyz[3 * (size_t)corner[0] + k], b = xyz[3 * (size_t)corner[1] + k],
+                        c = xyz[3 * (size_t)corner[2] + k];
+            p[k] = a;
+            u[k] = b - a;
+            v[k] = c - a;
+            low[k] = min(low[k], min(a, min(b, c)));
+            high[k] = max(high[k], max(a, max(b, c)));
+        }
+        ov_put_triangle(p, u, v, packed + (size_t)leaf * (OV_TRIANGLE * OV_LEAF) + j);
+    }
+    for (uint k = 0; k < 3; ++k) {
+        boxes[6 * (size_t)leaf + k] = low[k];
+        boxes[6 * (size_t)leaf + 3 + k] = high[k];
+    }
+}
+
+/* ---- distances ---------------------------------------------------------------------------- */
+
 /* On GPUs four boxes or triangles per work-item hide the latencies. */
 #if OV_VECTOR == 1
 #define OV_WIDE 4
@@ -85,6 +166,18 @@ static inline float ov_leaf_distance(float px, float py, float pz, __global cons
     return least;
 }
 
+/* Least squared distance to one corner of each triangle of a leaf: no less than to the triangles,
+ * and quickly found. */
+static inline float ov_corner_distance(float px, float py, float pz, __global const float *leaf) {
+    float least = INFINITY;
+    for (uint k = 0; k < OV_LEAF / OV_WIDE; ++k) {
+        const ov_wide x = px - OV_WIDE_LOAD(k, leaf), y = py - OV_WIDE_LOAD(k, leaf + OV_LEAF),
+                      z = pz - OV_WIDE_LOAD(k, leaf + 2 * OV_LEAF);
+        least = min(least, ov_least(fma(x, x, fma(y, y, z * z))));
+    }
+    return least;
+}
+
 /* Squared distances to the boxes of a group; absent boxes are infinitely far. */
 static inline void ov_box_distances(float px, float py, float pz, __global const float *group,
                                     float *distance) {
@@ -105,10 +198,10 @@ static inline void ov_box_distances(float px, float py, float pz, __global const
 
 /* Squared distance to the nearest triangle of the leaves from first to end if that is below
  * `bound`, else bound; to any triangle once that is at most `enough`. triangles: of these leaves.
- */
+ * *leaf becomes the one that the triangle is in. */
 static inline float ov_nearest(float px, float py, float pz, float bound, float enough, int levels,
                                const uint *first_group, __global const float *boxes, uint first,
-                               uint end, __global const float *triangles) {
+                               uint end, __global const float *triangles, uint *leaf) {
     float distance[OV_LEVELS * OV_GROUP];      /* of the boxes of each level's current group */
     uint pending[OV_LEVELS], group[OV_LEVELS]; /* a bit for each of them still to be visited */
     int level = levels - 1;
@@ -146,9 +239,10 @@ static inline float ov_nearest(float px, float py, float pz, float bound, float 
         pending[level] &= ~(1u << nearest);
         const uint child = group[level] * OV_GROUP + nearest;
         if (level == 0) {
-            bound = min(bound, ov_leaf_distance(px, py, pz,
-                                                triangles + (size_t)(child - first) *
-                                                                (OV_TRIANGLE * OV_LEAF)));
+            const float found = ov_leaf_distance(
+                px, py, pz, triangles + (size_t)(child - first) * (OV_TRIANGLE * OV_LEAF));
+            *leaf = found < bound ? child : *leaf;
+            bound = min(bound, found);
         } else {
             group[--level] = child;
             fresh = true;
@@ -157,11 +251,15 @@ static inline float ov_nearest(float px, float py, float pz, float bound, float 
     return bound;
 }
 
+/* Leaves before and after that one whose corners are tried. */
+#define NEAR_LEAVES 3u
+
 /* squared[k] = squared distance of point k, xyz[3 * k + {0, 1, 2}], to the leaves from first_leaf
  * to end_leaf, which lie between low and high and whose triangles are given; with use_bound to them
  * or what squared[k] was before, whichever is less. For `each` consecutive points per work-item:
- * what one of them has found bounds the distance of the next. Infinite beyond what a float holds.
- * What is at most `enough` need not be the least, only as much as the distance or more. */
+ * corners about the leaf that was nearest to one of them bound the distance of the next, most often
+ * by `enough` already. Infinite beyond what a float holds. What is at most `enough` need not be the
+ * least, only as much as the distance or more. */
 __kernel void distances(const uint count, const uint each, __global const float *restrict xyz,
                         const ov_tree tree, __global const float *restrict boxes,
                         const uint first_leaf, const uint end_leaf, const float4 low,
@@ -174,31 +272,26 @@ __kernel void distances(const uint count, const uint each, __global const float 
     for (uint l = 0; l < OV_LEVELS; ++l)
         first_group[l] = tree.groups[l];
     const size_t first = get_global_id(0) * (size_t)each;
-    float bound = INFINITY, x = 0.0f, y = 0.0f, z = 0.0f;
+    uint leaf = end_leaf; /* none */
     for (size_t k = first; k < min(first + each, (size_t)count); ++k) {
-        const float dx = xyz[3 * k] - x, dy = xyz[3 * k + 1] - y, dz = xyz[3 * k + 2] - z;
-        x = xyz[3 * k];
-        y = xyz[3 * k + 1];
-        z = xyz[3 * k + 2];
-        /* The triangle found before is at most this far; the factor stands for rounding. */
-        const float reach = (sqrt(bound) + sqrt(fma(dx, dx, fma(dy, dy, dz * dz)))) * 1.00001f;
-        const float most = use_bound ? squared[k] : INFINITY;
+        const float x = xyz[3 * k], y = xyz[3 * k + 1], z = xyz[3 * k + 2];
+        float bound = use_bound ? squared[k] : INFINITY;
         const float bx = max(max(low.x - x, x - high.x), 0.0f),
                     by = max(max(low.y - y, y - high.y), 0.0f),
                     bz = max(max(low.z - z, z - high.z), 0.0f);
-        if (use_bound && fma(bx, bx, fma(by, by, bz * bz)) >= most) {
-            bound = most;
+        if (use_bound && fma(bx, bx, fma(by, by, bz * bz)) >= bound)
             continue;
+        const uint after = min(leaf + 1 + NEAR_LEAVES, end_leaf);
+        for (uint near = max(leaf, first_leaf + NEAR_LEAVES) - NEAR_LEAVES;
+             near < after && leaf < end_leaf && bound > enough; ++near) {
+            const float found = ov_corner_distance(
+                x, y, z, triangles + (size_t)(near - first_leaf) * (OV_TRIANGLE * OV_LEAF));
+            leaf = found < bound ? near : leaf;
+            bound = min(bound, found);
         }
-        float limit = min(fma(reach, reach, FLT_MIN), most);
-        /* A loop around one call: compilers that inline it do so once. */
-        for (bound = limit; limit > enough;) {
-            bound = ov_nearest(x, y, z, limit, enough, levels, first_group, boxes, first_leaf,
-                               end_leaf, triangles);
-            if (bound < limit || limit == most)
-                break;
-            limit = most;
-        }
+        if (bound > enough)
+            bound = ov_nearest(x, y, z, bound, enough, levels, first_group, boxes, first_leaf,
+                               end_leaf, triangles, &leaf);
         squared[k] = bound;
     }
 }

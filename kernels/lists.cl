@@ -153,9 +153,9 @@ static inline uint ov_bin(uint group, uint term, uint block) {
  * one after, and chain[term].y the number of entries. Chunks from `room` on are counted, not
  * written.
  *
- * tally: chunks taken, pairs of every term, entries of every bin, pairs of every group, all zero at
- * the start but those of terms. block: terms that share a bin. groups: of packs, 0 where nobody
- * wants their lists, and bins and groups are not counted. */
+ * tally, zero at the start: chunks taken, entries of every bin, pairs of every group, pairs of
+ * every term. block: terms that share a bin. groups: of packs, 0 where nobody wants their lists,
+ * and bins and groups are not counted. */
 __kernel void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
                              const ov_tree tree, __global const float *restrict boxes,
                              const float skin, const uint groups, const uint block, const uint room,
@@ -171,7 +171,7 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     const uint index = get_global_id(0);
     if (index >= terms_count)
         return;
-    __global uint *const bins = tally + 1 + terms_count;
+    __global uint *const bins = tally + 1;
     __global uint *const pairs = bins + (size_t)groups * OV_BINS;
     const ov_term t = terms[index];
     uint found = 0, entries = 0, first = 0, chunk = 0;
@@ -242,51 +242,112 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
             fresh = true;
         }
     }
-    tally[1 + index] = found;
+    pairs[groups + index] = found;
     chain[index] = (uint2)(first, entries);
 }
 
-/* The packs of every term in ascending order: those of term i from item[start[i]] on. */
-__kernel void lists_of_terms(const uint terms_count, __global const uint2 *restrict chain,
-                             __global const uint *restrict next,
-                             __global const uint *restrict entry_group,
-                             __global const ushort *restrict entry_bits,
-                             __global const uint *restrict start, __global uint *restrict item) {
-    const uint index = get_global_id(0);
-    if (index >= terms_count)
-        return;
-    const uint entries = chain[index].y;
-    uint chunk = chain[index].x;
-    uint to = start[index];
-    for (uint k = 0; k < entries; ++k) {
-        if (k > 0 && k % OV_CHUNK == 0)
-            chunk = next[chunk];
-        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
-        const uint pack = entry_group[at] * OV_GROUP;
-        for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
-            item[to++] = pack + ov_lowest(bits);
+/* The stretch of `count` numbers that a work-item of the only work-group takes: first and end. */
+static inline uint2 own_stretch(const uint count) {
+    const uint size = get_local_size(0), each = (count + size - 1) / size;
+    const uint first = min((uint)get_local_id(0) * each, count);
+    return (uint2)(first, min(first + each, count));
+}
+
+/* What the numbers of the stretches before this work-item's come to, and all of them. */
+static inline ulong2 sums_of(__global const uint *number, const uint count,
+                             __local ulong *scratch) {
+    const uint2 own = own_stretch(count);
+    ulong sum = 0;
+    ulong2 sums = 0;
+    for (uint k = own.x; k < own.y; ++k)
+        sum += number[k];
+    scratch[get_local_id(0)] = sum;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint k = 0; k < get_local_size(0); ++k) {
+        sums.x += k < get_local_id(0) ? scratch[k] : 0;
+        sums.y += scratch[k];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    return sums;
+}
+
+/* Turns numbers into where each begins when all are laid out one after the other, or into zeros
+ * where there is no room for them, and leaves zeros behind. start may be null. */
+static inline void turn_to_starts(__global uint *number, const uint count, ulong before,
+                                  const bool fits, __global uint *start) {
+    const uint2 own = own_stretch(count);
+    for (uint k = own.x; k < own.y; ++k) {
+        const uint one = number[k];
+        number[k] = 0;
+        if (start)
+            start[k] = fits ? (uint)before : 0;
+        before += one;
     }
 }
 
-/* Hands the entries to their groups: place holds where each bin begins, and afterwards ends. The
- * order within a bin depends on timing. */
+/* Where everything that was counted begins. place: the bins, then the pairs of the groups. start:
+ * the pairs of the terms, and where the last ones end. Either may be null. room: for chunks,
+ * entries and pairs; where one does not suffice all lists are empty. totals: chunks taken, entries,
+ * pairs as low and high half, and whether there was room. The tally is zero afterwards, for the
+ * next time. One work-group. */
+__kernel void scan_lists(const uint terms_count, const uint groups, const uint4 room,
+                         __global uint *restrict tally, __global uint *restrict place,
+                         __global uint *restrict start, __global uint *restrict totals) {
+    __local ulong scratch[OV_SCAN_GROUP];
+    if (get_group_id(0) > 0)
+        return;
+    const uint count = groups * OV_BINS, chunks = tally[0];
+    __global uint *const bins = tally + 1, *const pairs = bins + count;
+    __global uint *const terms = pairs + groups;
+    const ulong2 entries = sums_of(bins, count, scratch);
+    const ulong2 grouped = sums_of(pairs, groups, scratch);
+    const ulong2 items = sums_of(terms, terms_count, scratch);
+    const bool fits = chunks <= room.x && entries.y <= room.y && items.y <= room.z;
+    turn_to_starts(bins, count, entries.x, fits, place);
+    turn_to_starts(pairs, groups, grouped.x, fits, place ? place + count : place);
+    turn_to_starts(terms, terms_count, items.x, fits, start);
+    if (get_local_id(0) > 0)
+        return;
+    if (start)
+        start[terms_count] = fits ? (uint)items.y : 0;
+    totals[0] = chunks;
+    totals[1] = (uint)entries.y;
+    totals[2] = (uint)items.y;
+    totals[3] = (uint)(items.y >> 32);
+    totals[4] = fits;
+    tally[0] = 0;
+}
+
+/* Hands out the entries of every term. item: its packs in ascending order, from item[start[i]] on.
+ * group_term, group_bits: the entries of each group of packs; place holds where each bin begins,
+ * and afterwards ends, and the order within a bin depends on timing. start or place may be null:
+ * nobody wants these lists. */
 __kernel void
-entries_of_groups(const uint terms_count, const uint block, __global const uint2 *restrict chain,
-                  __global const uint *restrict next, __global const uint *restrict entry_group,
-                  __global const ushort *restrict entry_bits, __global uint *restrict place,
-                  __global uint *restrict group_term, __global ushort *restrict group_bits) {
+hand_out_entries(const uint terms_count, const uint block, __global const uint2 *restrict chain,
+                 __global const uint *restrict next, __global const uint *restrict entry_group,
+                 __global const ushort *restrict entry_bits, __global const uint *restrict start,
+                 __global uint *restrict item, __global uint *restrict place,
+                 __global uint *restrict group_term, __global ushort *restrict group_bits,
+                 __global const uint *restrict totals) {
     const uint index = get_global_id(0);
-    if (index >= terms_count)
+    if (index >= terms_count || totals[4] == 0)
         return;
     const uint entries = chain[index].y;
     uint chunk = chain[index].x;
+    uint to = start ? start[index] : 0;
     for (uint k = 0; k < entries; ++k) {
         if (k > 0 && k % OV_CHUNK == 0)
             chunk = next[chunk];
         const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
-        const uint to = atomic_inc(&place[ov_bin(entry_group[at], index, block)]);
-        group_term[to] = index;
-        group_bits[to] = entry_bits[at];
+        const uint group = entry_group[at];
+        if (place) {
+            const uint own = atomic_inc(&place[ov_bin(group, index, block)]);
+            group_term[own] = index;
+            group_bits[own] = entry_bits[at];
+        }
+        if (start)
+            for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
+                item[to++] = group * OV_GROUP + ov_lowest(bits);
     }
 }
 

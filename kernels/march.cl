@@ -104,10 +104,11 @@ __kernel void march_signs(const uint bricks, const uint run, const float isovalu
 }
 
 /* For the nx * ny * nz bricks of the piece, in raster order: masks of crossed edges into `crossing`
- * (of the padded grid), number of triangles into `triangles` (of the piece). */
+ * (of the padded grid), number of vertices + 256 * number of triangles into `found` (of the piece).
+ */
 __kernel void march_count(const uint nx, const uint ny, const uint nz, const uint run,
                           __global const uint *restrict sign, __global const uchar *restrict cases,
-                          __global uint4 *restrict crossing, __global uint *restrict triangles) {
+                          __global uint4 *restrict crossing, __global uint *restrict found) {
     const uint bricks = nx * ny * nz;
     const uint first = get_global_id(0) * run, end = min(first + run, bricks);
     for (uint k = first; k < end; ++k) {
@@ -116,24 +117,27 @@ __kernel void march_count(const uint nx, const uint ny, const uint nz, const uin
         uint count = 0;
         for (uint cells = mixed_cells(&c); cells; cells &= cells - 1)
             count += cases[case_of(&c, lowest_bit(cells)) * CASE_BYTES];
-        crossing[brick] = (uint4)(0, c.at[0] ^ c.at[1], c.at[0] ^ c.at[2], c.at[0] ^ c.at[4]);
-        triangles[k] = count;
+        const uint x = c.at[0] ^ c.at[1], y = c.at[0] ^ c.at[2], z = c.at[0] ^ c.at[4];
+        crossing[brick] = (uint4)(0, x, y, z);
+        found[k] = popcount(x) + popcount(y) + popcount(z) + (count << 8);
     }
 }
 
-/* values[k] = those of the k-th brick of the list. */
+/* values[k], crossings[k] = those of the k-th brick of the list. */
 __kernel void march_get(const uint count, __global const uint *restrict list,
                         __global const uint *restrict place, __global const float *restrict value,
-                        __global float *restrict values) {
+                        __global const uint4 *restrict crossing, __global float *restrict values,
+                        __global uint4 *restrict crossings) {
     const uint k = get_global_id(0);
     if (k >= count)
         return;
     __global const float *const from = value + (size_t)place[list[k]] * OV_PACK;
     for (uint j = 0; j < OV_PACK; ++j)
         values[(size_t)k * OV_PACK + j] = from[j];
+    crossings[k] = crossing[list[k]];
 }
 
-/* The other way, with the bricks' crossings. */
+/* The other way. */
 __kernel void march_put(const uint count, __global const uint *restrict list,
                         __global const uint *restrict place, __global const float *restrict values,
                         __global const uint4 *restrict crossings, __global float *restrict value,
@@ -184,20 +188,22 @@ static inline float crossing_at(float a, float b, float isovalue, int logarithmi
     return t >= 0.0f && t <= 1.0f ? t : 0.5f; /* not a number where phi overflows */
 }
 
-/* The vertices of the listed bricks. Each entry of the list is {brick, first vertex within the
- * piece, first triangle, 0}. edge: x + (y << 7) + (z << 14) of the low end in lattice points from
- * the piece's corner, axis << 20, and 1 << 22 if the low end is inside. t: where on the edge. */
+/* The vertices of the listed bricks, and their numbers into `crossing`. Each entry of the list is
+ * {brick, first vertex within the piece, first triangle, number of the first vertex}. edge: x + (y
+ * << 7) + (z << 14) of the low end in lattice points from the piece's corner, axis << 20, and 1 <<
+ * 22 if the low end is inside. t: where on the edge. */
 __kernel void march_vertices(const uint count, __global const uint4 *restrict list, const uint nx,
                              const uint ny, const float isovalue, const int logarithmic,
                              __global const uint *restrict place,
                              __global const float *restrict value,
-                             __global const uint4 *restrict crossing, __global uint *restrict edge,
+                             __global uint4 *restrict crossing, __global uint *restrict edge,
                              __global float *restrict t) {
     const uint item = get_global_id(0);
     if (item >= count)
         return;
     const uint brick = list[item].x;
     const uint4 crossed = crossing[brick];
+    crossing[brick].x = list[item].w;
     const uint mask[3] = {crossed.y, crossed.z, crossed.w};
     const uint bx = brick % (nx + 1), by = brick / (nx + 1) % (ny + 1),
                bz = brick / ((nx + 1) * (ny + 1));
@@ -213,6 +219,33 @@ __kernel void march_vertices(const uint count, __global const uint4 *restrict li
             edge[at] = x | y << 7 | z << 14 | axis << 20 | (a > isovalue ? 1u : 0u) << 22;
             t[at] = keep_within(crossing_at(a, b, isovalue, logarithmic));
         }
+}
+
+/* Fills the last pack of vertices up with its last one. box: of each pack, low x, y, z, high x, y,
+ * z in lattice points from the piece's corner, wherever on their edges the vertices come to lie. */
+__kernel void march_boxes(const uint packs, const uint vertices, __global uint *restrict edge,
+                          __global float *restrict t, __global int *restrict box) {
+    const uint pack = get_global_id(0);
+    if (pack >= packs)
+        return;
+    const uint first = pack * OV_PACK;
+    int low[3] = {128, 128, 128}, high[3] = {0, 0, 0};
+    for (uint k = first; k < first + OV_PACK; ++k) {
+        const uint from = min(k, vertices - 1), code = edge[from], axis = code >> 20 & 3u;
+        const int at[3] = {code & 127u, code >> 7 & 127u, code >> 14 & 63u};
+        for (uint i = 0; i < 3; ++i) {
+            low[i] = min(low[i], at[i]);
+            high[i] = max(high[i], at[i] + (i == axis ? 1 : 0));
+        }
+        if (k > from) {
+            edge[k] = code;
+            t[k] = t[from];
+        }
+    }
+    for (uint i = 0; i < 3; ++i) {
+        box[6 * pack + i] = low[i];
+        box[6 * pack + 3 + i] = high[i];
+    }
 }
 
 /* The triangles of the listed bricks, three vertex numbers each. */

@@ -38,6 +38,9 @@ typedef float ov_f32;
  * xxyz, xxzz, xyyy, xyyz, xyzz, xzzz, yyyy, yyyz, yyzz, yzzz, zzzz. */
 #define OV_GRAM 35
 
+/* Work-items that make starts of counts, at most. */
+#define OV_SCAN_GROUP 256
+
 /* Packs that share a sum of the misfit (kernels/misfit.cl). */
 #define OV_MISFIT_PACKS 64
 

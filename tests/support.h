@@ -6,6 +6,7 @@
 #define SUPPORT_H
 
 #include "field/field.h"
+#include "once.h"
 #include "reference/reference.h"
 
 #include <float.h>

@@ -94,13 +94,13 @@ static void earlier_structures_get_defaults(void **state) {
     ovoid_molecule *molecule = two_atoms(*state);
     ovoid_mesh *mesh = NULL;
     assert_int_equal(offsetof(ovoid_mesh_options, spacing), 2 * sizeof(double));
-    test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5,
-                                           (const ovoid_mesh_options *)&options, &mesh));
+    test_check(*state, once_molecule_mesh(*state, molecule, 0.5,
+                                          (const ovoid_mesh_options *)&options, &mesh));
     ovoid_mesh_destroy(&mesh);
     options.size = sizeof(ovoid_mesh_options); /* as if it were meant */
     test_refused(
         *state,
-        ovoid_molecule_mesh(*state, molecule, 0.5, (const ovoid_mesh_options *)&options, &mesh),
+        once_molecule_mesh(*state, molecule, 0.5, (const ovoid_mesh_options *)&options, &mesh),
         OVOID_ERROR_ARGUMENT, "spacing");
     ovoid_molecule_destroy(&molecule);
 }
@@ -240,7 +240,7 @@ static void progress_is_of_its_method(void **state) {
         options.adaptive.ellipsoids = 1;
         ovoid_context_on_progress(*state, listen, &l);
         if (method == OVOID_NO_METHOD)
-            test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &meshing, &mesh));
+            test_check(*state, once_molecule_mesh(*state, molecule, 0.5, &meshing, &mesh));
         else
             test_check(*state, ovoid_fit(*state, molecule, &options, &model, NULL));
         ovoid_context_on_progress(*state, NULL, NULL);
@@ -276,7 +276,7 @@ static void callbacks_may_use_other_contexts_alone(void **state) {
     ovoid_mesh_options_init(&options, sizeof options);
     test_check(NULL, ovoid_context_create(&l.other));
     ovoid_context_on_progress(*state, call_back, &l);
-    test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
+    test_check(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
     ovoid_context_on_progress(*state, NULL, NULL);
     assert_true(l.calls > 0);
     ovoid_mesh_destroy(&mesh);

@@ -1,6 +1,6 @@
 /*
  * The adaptive method from outside, by ovoid_fit(): its goals, odd molecules, what is independent
- * of the device, and stops. Models are measured by ovoid_measure(), which knows nothing of fits.
+ * of the device, and stops. Models are measured by once_measure(), which knows nothing of fits.
  */
 #include "ovoid/ovoid.h"
 #include "support.h"
@@ -73,7 +73,7 @@ static void measure(ovoid_context *context, const ovoid_molecule *molecule,
     measuring.isovalue = options->isovalue;
     measuring.spacing = options->adaptive.mesh_spacing;
     ovoid_measures_init(&o->measures, sizeof o->measures);
-    test_check(context, ovoid_measure(context, molecule, o->model, &measuring, &o->measures));
+    test_check(context, once_measure(context, molecule, o->model, &measuring, &o->measures));
     /* The file's nine digits apart, what the fit says is what anybody measures. */
     expect_near(o->result.distance, o->measures.deviation, 1e-4, "the distance");
 }

@@ -25,17 +25,18 @@ static void expect_distances(ovoid_context *context, const double *xyz, size_t v
     ovoid_mesh *mesh = NULL;
     ov_trail trail = {0};
     ov_facets facets = {0};
+    ov_meter meter = {0};
     const ov_sites sites = {.count = count, .xyz = points};
     float *const squared = test_alloc(count, sizeof *squared);
     float *const again = test_alloc(count, sizeof *again);
     test_check(context, ovoid_mesh_create(context, xyz, NULL, vertices, corners, triangles, &mesh));
     test_check(context, ov_trail_create(context, mesh, false, &trail));
-    test_check(context, ov_facets_create(context, &trail, origin, &facets));
-    test_check(context, ov_facets_distances(context, &facets, &sites, squared));
+    test_check(context, ov_facets_set(context, &facets, &trail, origin));
+    test_check(context, ov_facets_distances(context, &meter, &facets, &sites, squared));
     for (size_t n = 0; n < sizeof chunks / sizeof *chunks; ++n) {
         facets.chunk = chunks[n];
-        facets.batch = count / (n + 1) + n;
-        test_check(context, ov_facets_distances(context, &facets, &sites, again));
+        meter.batch = count / (n + 1) + n;
+        test_check(context, ov_facets_distances(context, &meter, &facets, &sites, again));
         assert_memory_equal(again, squared, count * sizeof *squared);
     }
     double worst = 0.0;
@@ -52,6 +53,7 @@ static void expect_distances(ovoid_context *context, const double *xyz, size_t v
     free(again);
     free(squared);
     ov_facets_destroy(&facets);
+    ov_meter_destroy(&meter);
     ov_trail_destroy(&trail);
     ovoid_mesh_destroy(&mesh);
 }
@@ -74,21 +76,23 @@ static void test_one_triangle(void **state) {
     ovoid_mesh *mesh = NULL;
     ov_trail trail = {0};
     ov_facets facets = {0};
+    ov_meter meter = {0};
     float points[3 * CASES], squared[CASES];
     for (size_t k = 0; k < CASES; ++k)
         memcpy(points + 3 * k, cases[k].point, sizeof cases[k].point);
     test_check(context, ovoid_mesh_create(context, xyz, NULL, 3, corners, 1, &mesh));
     test_check(context, ov_trail_create(context, mesh, false, &trail));
     assert_int_equal(trail.vertices, 3);
-    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    test_check(context, ov_facets_set(context, &facets, &trail, origin));
     const ov_sites sites = {.count = CASES, .xyz = points};
-    test_check(context, ov_facets_distances(context, &facets, &sites, squared));
+    test_check(context, ov_facets_distances(context, &meter, &facets, &sites, squared));
     for (size_t k = 0; k < CASES; ++k) {
         const double got = sqrt((double)squared[k]);
         if (!(fabs(got - cases[k].distance) <= 3e-7 * fmax(1.0, cases[k].distance)))
             fail_msg("case %zu: %.9g instead of %.9g", k, got, cases[k].distance);
     }
     ov_facets_destroy(&facets);
+    ov_meter_destroy(&meter);
     ov_trail_destroy(&trail);
     ovoid_mesh_destroy(&mesh);
 }
@@ -233,13 +237,28 @@ static void test_twin(void **state) {
     shape_destroy(&s[1]);
 }
 
+static void vertex_distances(ovoid_context *context, const ovoid_mesh *from, const ovoid_mesh *to,
+                             const double origin[3], double enough, float *distance) {
+    ov_trail points = {0}, triangles = {0};
+    ov_facets facets = {0};
+    ov_meter meter = {.enough = enough};
+    test_check(context, ov_trail_create(context, from, false, &points));
+    test_check(context, ov_trail_create(context, to, false, &triangles));
+    test_check(context, ov_facets_set(context, &facets, &triangles, origin));
+    test_check(context, ov_trail_distances(context, &meter, &facets, &points, distance));
+    ov_meter_destroy(&meter);
+    ov_facets_destroy(&facets);
+    ov_trail_destroy(&points);
+    ov_trail_destroy(&triangles);
+}
+
 /* What is further than enough is as far as ever, and what is not is told as no more than that. */
 static void expect_bounds(ovoid_context *context, const ovoid_mesh *from, const ovoid_mesh *to,
                           const double origin[3], const float *exact) {
     const double enough = 0.9;
     size_t nearer = 0, looser = 0;
     float *const got = test_alloc(from->vertices, sizeof *got);
-    test_check(context, ov_vertex_distances(context, from, to, origin, enough, NULL, got));
+    vertex_distances(context, from, to, origin, enough, got);
     for (size_t v = 0; v < from->vertices; ++v) {
         if (exact[v] > enough)
             expect_near(got[v], exact[v], 1e-6, "a distance beyond enough");
@@ -282,7 +301,7 @@ static void test_vertices(void **state) {
         float *const got = test_alloc(from->vertices, sizeof *got);
         bool *const used = test_alloc(from->vertices, sizeof *used);
         got[0] = NAN;
-        test_check(context, ov_vertex_distances(context, from, to, middle, 0.0, NULL, got));
+        vertex_distances(context, from, to, middle, 0.0, got);
         for (size_t k = 0; k < 3 * from->triangles; ++k)
             used[from->corners[k]] = true;
         for (size_t v = 0; v < from->vertices; ++v)
@@ -314,22 +333,24 @@ static void test_far_chunks(void **state) {
     const double origin[3] = {40, 0, 0};
     ov_trail trail = {0};
     ov_facets facets = {0};
+    ov_meter meter = {0};
     ov_device *device;
     float *const squared = test_alloc(mesh->vertices, sizeof *squared);
     test_check(context, ov_device_get(context, &device));
     test_check(context, ov_trail_create(context, mesh, false, &trail));
-    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    test_check(context, ov_facets_set(context, &facets, &trail, origin));
     facets.chunk = mesh->triangles / OV_LEAF / BALLS;
-    facets.batch = mesh->vertices / BALLS;
+    meter.batch = mesh->vertices / BALLS;
     const ov_sites sites = {.count = mesh->vertices, .trail = &trail};
     const uint64_t before = device->counts[OVOID_COUNT_LAUNCHES];
-    test_check(context, ov_facets_distances(context, &facets, &sites, squared));
-    assert_int_equal(device->counts[OVOID_COUNT_LAUNCHES] - before,
-                     2 * BALLS); /* the coarse ones, and one each */
+    test_check(context, ov_facets_distances(context, &meter, &facets, &sites, squared));
+    /* Of the coarse leaves and of each chunk one that packs them, and one for each ball. */
+    assert_int_equal(device->counts[OVOID_COUNT_LAUNCHES] - before, 1 + BALLS + 2 * BALLS);
     for (size_t v = 0; v < mesh->vertices; ++v)
         expect_near(squared[v], 0.0, 1e-9, "distance of a vertex from itself");
     free(squared);
     ov_facets_destroy(&facets);
+    ov_meter_destroy(&meter);
     ov_trail_destroy(&trail);
     ovoid_mesh_destroy(&mesh);
     shape_destroy(&s);
@@ -347,6 +368,7 @@ static void test_near_chunks(void **state) {
     ovoid_mesh *mesh = shape_mesh(context, &s);
     ov_trail trail = {0};
     ov_facets facets = {0};
+    ov_meter meter = {0};
     float *const xyz = test_alloc(3 * count, sizeof *xyz);
     float *const squared = test_alloc(count, sizeof *squared);
     for (size_t k = 0; k < count; ++k) /* from 1 to 6 angstrom outside, in order */
@@ -356,13 +378,13 @@ static void test_near_chunks(void **state) {
             xyz[3 * k + j] = (float)(way * (axes[j] + random_uniform(&random, 1.0, 6.0)));
         }
     test_check(context, ov_trail_create(context, mesh, false, &trail));
-    test_check(context, ov_facets_create(context, &trail, origin, &facets));
+    test_check(context, ov_facets_set(context, &facets, &trail, origin));
     facets.chunk = OV_GROUP;
     for (size_t batch = 1; batch <= 4; batch += 3) {
         const ov_sites sites = {.count = count, .xyz = xyz};
         size_t off = 0;
-        facets.batch = batch;
-        test_check(context, ov_facets_distances(context, &facets, &sites, squared));
+        meter.batch = batch;
+        test_check(context, ov_facets_distances(context, &meter, &facets, &sites, squared));
         for (size_t k = 0; k < count; ++k) {
             const double point[3] = {xyz[3 * k], xyz[3 * k + 1], xyz[3 * k + 2]};
             const double wanted = reference_mesh_distance(point, mesh, false);
@@ -375,6 +397,7 @@ static void test_near_chunks(void **state) {
     free(xyz);
     free(squared);
     ov_facets_destroy(&facets);
+    ov_meter_destroy(&meter);
     ov_trail_destroy(&trail);
     ovoid_mesh_destroy(&mesh);
     shape_destroy(&s);

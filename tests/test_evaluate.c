@@ -32,7 +32,7 @@ static void molecule_field_keeps_the_order(void **state) {
     ovoid_molecule *molecule = random_molecule(*state, xyzr);
     double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value),
                   *const gradient = test_alloc(3 * count, sizeof *gradient);
-    test_check(*state, ovoid_molecule_field(*state, molecule, d, xyz, count, value, gradient));
+    test_check(*state, once_molecule_field(*state, molecule, d, xyz, count, value, gradient));
     for (size_t k = 0; k < count; ++k) {
         const double wanted = reference_phi(xyzr, ATOMS, d, xyz + 3 * k);
         expect_near(value[k], wanted, 5e-6 * wanted + 1e-7 * ATOMS, "phi");
@@ -68,7 +68,7 @@ static void model_field_is_the_papers_sum(void **state) {
     test_check(*state, ovoid_model_create(*state, ellipsoids, size, 0.5, 1.0, &model));
     double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value),
                   *const gradient = test_alloc(3 * count, sizeof *gradient);
-    test_check(*state, ovoid_model_field(*state, model, xyz, count, value, gradient));
+    test_check(*state, once_model_field(*state, model, xyz, count, value, gradient));
     for (size_t k = 0; k < count; ++k) {
         double wanted = 0.0, slope[3] = {0};
         for (size_t i = 0; i < size; ++i) {
@@ -102,7 +102,7 @@ static void error_is_as_the_header_says(void **state) {
     double xyzr[4 * ATOMS], worst = 0.0;
     ovoid_molecule *molecule = random_molecule(*state, xyzr);
     double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value);
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz, count, value, NULL));
     for (size_t k = 0; k < count; ++k) {
         const double wanted = reference_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
         if (wanted > 0.1)
@@ -124,14 +124,14 @@ static void more_than_a_million_points(void **state) {
     ovoid_molecule *molecule = random_molecule(*state, xyzr);
     double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value),
                   *const gradient = test_alloc(3 * count, sizeof *gradient);
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
     for (size_t k = 0; k < count; k += k < count - 200 ? 997 : 1) {
         const double wanted = reference_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
         expect_near(value[k], wanted, 5e-6 * wanted + 1e-7 * ATOMS, "phi");
     }
     double single[4];
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz + 3 * (count - 1), 1, single,
-                                            single + 1));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz + 3 * (count - 1), 1, single,
+                                           single + 1));
     expect_near(gradient[3 * count - 1], single[3], 1e-5, "the last gradient");
     free(xyz);
     free(value);
@@ -143,13 +143,13 @@ static void odd_points(void **state) {
     double xyzr[4 * ATOMS], value[4] = {-1.0, -1.0, -1.0, -1.0};
     ovoid_molecule *molecule = random_molecule(*state, xyzr);
     /* none */
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, NULL, 0, NULL, NULL));
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyzr, 0, value, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, NULL, 0, NULL, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, xyzr, 0, value, NULL));
     assert_true(value[0] == -1.0);
     /* far away, and the same point several times */
     const double xyz[] = {1e7,   0.0,   0.0,   100.0, 100.0, 100.0,
                           100.0, 100.0, 100.0, -1e30, 1e30,  0.0};
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 4, value, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz, 4, value, NULL));
     assert_true(value[0] >= 0.0 && value[0] < 1e-30 && value[3] >= 0.0 && value[3] < 1e-30);
     assert_true(value[1] == value[2]);
     expect_near(value[1], reference_phi(xyzr, ATOMS, 0.5, xyz + 3), 1e-5 * value[1], "phi");
@@ -164,7 +164,7 @@ static void point_beyond_single_precision(void **state) {
     double value[3];
     ovoid_model *model = NULL;
     test_check(*state, ovoid_model_create(*state, &ellipsoid, 1, 0.5, 1.0, &model));
-    test_check(*state, ovoid_model_field(*state, model, xyz, 3, value, NULL));
+    test_check(*state, once_model_field(*state, model, xyz, 3, value, NULL));
     assert_true(value[0] >= 0.0 && value[0] < 1e-30);
     assert_true(value[2] >= 0.0 && value[2] < 1e-30);
     const double wanted = reference_ellipsoid(&ellipsoid, xyz + 3);
@@ -178,21 +178,21 @@ static void bad_arguments_change_nothing(void **state) {
     const double xyz[6] = {1.0, 2.0, 3.0, 4.0, NAN, 6.0};
     const double infinite[3] = {INFINITY, 0.0, 0.0};
     const ovoid_status argument = OVOID_ERROR_ARGUMENT;
-    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 2, value, gradient),
+    test_refused(*state, once_molecule_field(*state, molecule, 0.5, xyz, 2, value, gradient),
                  argument, "point 1");
-    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, infinite, 1, value, gradient),
+    test_refused(*state, once_molecule_field(*state, molecule, 0.5, infinite, 1, value, gradient),
                  argument, "point 0");
-    test_refused(*state, ovoid_molecule_field(*state, NULL, 0.5, xyz, 1, value, NULL), argument,
+    test_refused(*state, once_molecule_field(*state, NULL, 0.5, xyz, 1, value, NULL), argument,
                  "NULL");
-    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, NULL, 1, value, NULL),
-                 argument, "NULL");
-    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 1, NULL, NULL), argument,
+    test_refused(*state, once_molecule_field(*state, molecule, 0.5, NULL, 1, value, NULL), argument,
                  "NULL");
-    assert_int_equal(ovoid_molecule_field(NULL, molecule, 0.5, xyz, 1, value, NULL), argument);
-    test_refused(*state, ovoid_model_field(*state, NULL, xyz, 1, value, NULL), argument, "NULL");
+    test_refused(*state, once_molecule_field(*state, molecule, 0.5, xyz, 1, NULL, NULL), argument,
+                 "NULL");
+    assert_int_equal(once_molecule_field(NULL, molecule, 0.5, xyz, 1, value, NULL), argument);
+    test_refused(*state, once_model_field(*state, NULL, xyz, 1, value, NULL), argument, "NULL");
     const double decays[] = {0.0, -1.0, NAN, INFINITY, 101.0};
     for (size_t k = 0; k < sizeof decays / sizeof decays[0]; ++k)
-        test_refused(*state, ovoid_molecule_field(*state, molecule, decays[k], xyz, 1, value, NULL),
+        test_refused(*state, once_molecule_field(*state, molecule, decays[k], xyz, 1, value, NULL),
                      argument, "decay");
     assert_true(value[0] == -1.0 && value[1] == -1.0 && gradient[0] == -1.0);
     ovoid_molecule_destroy(&molecule);
@@ -204,10 +204,10 @@ static void huge_radius_is_refused(void **state) {
     double value = -1.0;
     ovoid_molecule *molecule = NULL;
     test_check(*state, ovoid_molecule_create(*state, xyzr, 1, &molecule));
-    test_refused(*state, ovoid_molecule_field(*state, molecule, 0.5, xyz, 1, &value, NULL),
+    test_refused(*state, once_molecule_field(*state, molecule, 0.5, xyz, 1, &value, NULL),
                  OVOID_ERROR_LIMIT, "radius");
     assert_true(value == -1.0);
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.3, xyz, 1, &value, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.3, xyz, 1, &value, NULL));
     expect_near(value, 1.0, 1e-4, "phi on the sphere of a large atom");
     ovoid_molecule_destroy(&molecule);
 }
@@ -283,8 +283,7 @@ static void error_is_the_same_at_every_extent(void **state) {
         ovoid_molecule *molecule = NULL;
         place_wide(half_extents[n / 2], n % 2, xyzr, xyz, count);
         test_check(*state, ovoid_molecule_create(*state, xyzr, WIDE, &molecule));
-        test_check(*state,
-                   ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
+        test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
         print_message("half extent %g, %s: ", half_extents[n / 2], n % 2 ? "spread" : "clusters");
         expect_field(xyzr, WIDE, 0.5, xyz, count, value, gradient);
         ovoid_molecule_destroy(&molecule);
@@ -314,7 +313,7 @@ static void error_of_a_wide_model(void **state) {
         }
     }
     test_check(*state, ovoid_model_create(*state, ellipsoids, WIDE, 0.5, 1.0, &model));
-    test_check(*state, ovoid_model_field(*state, model, xyz, count, value, gradient));
+    test_check(*state, once_model_field(*state, model, xyz, count, value, gradient));
     expect_field(xyzr, WIDE, 0.5, xyz, count, value, gradient);
     ovoid_model_destroy(&model);
     free(xyz);
@@ -331,7 +330,7 @@ static void points_far_outside(void **state) {
     double xyzr[4 * ATOMS], value[4], gradient[12], single[4];
     const double near[3] = {101.0, 99.0, 100.0};
     ovoid_molecule *molecule = random_molecule(*state, xyzr);
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, near, 1, single, single + 1));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, near, 1, single, single + 1));
     assert_true(single[0] > 0.1);
     for (int n = 0; n < 2 * OUT * 3; ++n) {
         const double far = n % 2 ? out[n / 6] : -out[n / 6];
@@ -343,7 +342,7 @@ static void points_far_outside(void **state) {
             memset(value, 0xff, sizeof value);
             memset(gradient, 0xff, sizeof gradient);
             test_check(*state,
-                       ovoid_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
+                       once_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
             for (int k = 0; k < 3; ++k) {
                 assert_true(value[k] == 0.0);
                 for (int axis = 0; axis < 3; ++axis)
@@ -368,7 +367,7 @@ static void model_that_reaches_far(void **state) {
     double value[4], gradient[12];
     ovoid_model *model = NULL;
     test_check(*state, ovoid_model_create(*state, &ellipsoid, 1, 0.5, 1.0, &model));
-    test_check(*state, ovoid_model_field(*state, model, xyz, 4, value, gradient));
+    test_check(*state, once_model_field(*state, model, xyz, 4, value, gradient));
     for (int k = 0; k < 2; ++k) {
         const double wanted = reference_ellipsoid(&ellipsoid, xyz + 3 * k);
         expect_near(value[k], wanted, 2e-6 * wanted, "phi~");
@@ -398,7 +397,7 @@ static void failure_leaves_the_outputs(void **state) {
     for (size_t k = 0; k < 4 * count; ++k)
         *(k < count ? value + k : gradient + k - count) = -7.0;
     device->info.max_allocation = 3 * inside * sizeof(float) - 1; /* not enough for the points */
-    test_refused(context, ovoid_molecule_field(context, molecule, 0.5, xyz, count, value, gradient),
+    test_refused(context, once_molecule_field(context, molecule, 0.5, xyz, count, value, gradient),
                  OVOID_ERROR_LIMIT, "points");
     for (size_t k = 0; k < 4 * count; ++k)
         assert_true(*(k < count ? value + k : gradient + k - count) == -7.0);

@@ -65,7 +65,7 @@ static ovoid_model *make_model(size_t repeat) {
 static char *export_text(scratch *s, const ovoid_model *model, const char *name,
                          const ovoid_export_options *options) {
     const char *path = scratch_path(s, name);
-    test_check(context, ovoid_model_export(context, model, path, options));
+    test_check(context, once_model_export(context, model, path, options));
     char *text = scratch_read(path);
     assert_non_null(text);
     return text;
@@ -439,7 +439,7 @@ static void locale_changes_nothing(void **state) {
         skip();
     }
     for (size_t i = 0; i < NAMES; i++)
-        written[i] = ovoid_model_export(context, model, scratch_path(s, names[i]), NULL);
+        written[i] = once_model_export(context, model, scratch_path(s, names[i]), NULL);
     assert_true(comma_leave(s));
     for (size_t i = 0; i < NAMES; i++) {
         assert_int_equal(written[i], OVOID_OK);
@@ -461,10 +461,10 @@ static void failures_leave_nothing(void **state) {
             ovoid_model_destroy(&model);
             skip();
         }
-        test_refused(context, ovoid_model_export(context, model, path, NULL), OVOID_ERROR_IO,
+        test_refused(context, once_model_export(context, model, path, NULL), OVOID_ERROR_IO,
                      "No space left on device");
     }
-    test_refused(context, ovoid_model_export(context, model, scratch_path(s, "no/m.py"), NULL),
+    test_refused(context, once_model_export(context, model, scratch_path(s, "no/m.py"), NULL),
                  OVOID_ERROR_IO, "there is no folder");
     assert_int_equal(scratch_entries(s), NAMES); /* the links */
     ovoid_model_destroy(&model);
@@ -499,20 +499,20 @@ static void what_makes_no_sense_is_refused(void **state) {
     test_check(context, ovoid_molecule_create(context, xyzr, 1, &molecule));
     static const char *const bad[] = {"m", "m.pdb", ".json", "m.json.gz", "m."};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        test_refused(
-            context, ovoid_model_export(context, model, scratch_path(*state, bad[i]), NULL),
-            OVOID_ERROR_ARGUMENT, "one of .bild, .cxc, .py, .gmm, .json, .mrc, .map, .ccp4, .dx");
-    test_refused(context, ovoid_model_export(context, model, "-", NULL), OVOID_ERROR_ARGUMENT,
+        test_refused(context, once_model_export(context, model, scratch_path(*state, bad[i]), NULL),
+                     OVOID_ERROR_ARGUMENT,
+                     "one of .bild, .cxc, .py, .gmm, .json, .mrc, .map, .ccp4, .dx");
+    test_refused(context, once_model_export(context, model, "-", NULL), OVOID_ERROR_ARGUMENT,
                  "name a format");
     const char *path = scratch_path(*state, "m.pdb");
-    test_refused(context, ovoid_molecule_export(context, molecule, 0.5, path, NULL),
+    test_refused(context, once_molecule_export(context, molecule, 0.5, path, NULL),
                  OVOID_ERROR_ARGUMENT, "in one of .mrc, .map, .ccp4, .dx");
     path = scratch_path(*state, "m.py");
-    test_refused(context, ovoid_molecule_export(context, molecule, 0.5, path, NULL),
+    test_refused(context, once_molecule_export(context, molecule, 0.5, path, NULL),
                  OVOID_ERROR_ARGUMENT, "fit a model to it first");
-    test_refused(context, ovoid_molecule_export(context, molecule, 0.0, path, NULL),
+    test_refused(context, once_molecule_export(context, molecule, 0.0, path, NULL),
                  OVOID_ERROR_ARGUMENT, "decay");
-    test_refused(context, ovoid_model_export(context, NULL, path, NULL), OVOID_ERROR_ARGUMENT,
+    test_refused(context, once_model_export(context, NULL, path, NULL), OVOID_ERROR_ARGUMENT,
                  "NULL");
     static const double wrong[] = {-1.0, NAN, INFINITY};
     for (size_t i = 0; i < 3; i++) {
@@ -522,8 +522,8 @@ static void what_makes_no_sense_is_refused(void **state) {
             double *const value[] = {&o.isovalue, &o.spacing, &o.colour[2], &o.opacity};
             static const char *const text[] = {"isovalue", "spacing", "colour", "opacity"};
             *value[which] = wrong[i];
-            test_refused(context, ovoid_model_export(context, model, path, &o),
-                         OVOID_ERROR_ARGUMENT, text[which]);
+            test_refused(context, once_model_export(context, model, path, &o), OVOID_ERROR_ARGUMENT,
+                         text[which]);
         }
     }
     assert_int_equal(scratch_entries(*state), 0);

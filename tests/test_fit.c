@@ -60,8 +60,8 @@ static void expect_result(ovoid_context *context, const ovoid_molecule *molecule
     double *const phi = test_alloc(count, sizeof *phi), *const fitted =
                                                             test_alloc(count, sizeof *phi);
     test_check(context,
-               ovoid_molecule_field(context, molecule, options->decay, xyz, count, phi, NULL));
-    test_check(context, ovoid_model_field(context, model, xyz, count, fitted, NULL));
+               once_molecule_field(context, molecule, options->decay, xyz, count, phi, NULL));
+    test_check(context, once_model_field(context, model, xyz, count, fitted, NULL));
     double square = 0.0, largest = 0.0;
     for (size_t k = 0; k < count; ++k) {
         const double error = reference_residual(fitted[k], phi[k], inside);

@@ -5,6 +5,7 @@
 #include "fit/motion.h"
 #include "measure/judge.h"
 #include "mixture/reduce.h"
+#include "once.h"
 #include "support.h"
 
 #define TOLERANCE 0.5
@@ -163,7 +164,7 @@ static double deviation_of(ovoid_context *context, const ovoid_molecule *molecul
     ovoid_measures measures;
     ovoid_measures_init(&measures, sizeof measures);
     ovoid_measure_options_init(&measuring, sizeof measuring);
-    test_check(context, ovoid_measure(context, molecule, model, &measuring, &measures));
+    test_check(context, once_measure(context, molecule, model, &measuring, &measures));
     return measures.deviation;
 }
 
@@ -626,6 +627,18 @@ static void errors_leave_it_usable(void **state) {
         expect_same(alone, model);
         ovoid_model_destroy(&model);
     }
+    test_check(*state, ovoid_context_open_device(*state, NULL)); /* it follows */
+    test_check(*state, ovoid_fitter_reach(*state, fitter, &options, &model, NULL));
+    expect_same(alone, model);
+    ovoid_model_destroy(&model);
+    test_check(*state, ovoid_context_create(&other));
+    test_check(other, ovoid_fitter_create(other, molecule, &options, &none));
+    test_check(other, ovoid_fitter_reach(other, none, &options, &model, NULL));
+    ovoid_model_destroy(&model);
+    ovoid_context_destroy(&other);
+    test_refused(*state, ovoid_fitter_reach(*state, none, &options, &model, NULL),
+                 OVOID_ERROR_ARGUMENT, "is gone");
+    ovoid_fitter_destroy(&none);
     options.decay = -1.0;
     test_refused(*state, ovoid_fitter_create(*state, molecule, &options, &none),
                  OVOID_ERROR_ARGUMENT, "decay");

@@ -190,6 +190,139 @@ static void a_filled_cavity(void **state) {
     ov_judge_destroy(&judge);
 }
 
+typedef struct countdown {
+    unsigned asked, most;
+} countdown;
+
+static bool count_down(void *user) {
+    countdown *const c = user;
+    return ++c->asked <= c->most;
+}
+
+/* ---- one model after the other -------------------------------------------------------------- */
+
+enum { ATOMS = 40, ROOM = 200 };
+
+/* Molecules of several shapes: a clump, a chain, a shell about a cavity, all with an ion far off,
+ * which is small to the lattice. */
+static void put_molecule(test_random *random, int form, double *xyzr) {
+    for (size_t i = 0; i < ATOMS; ++i) {
+        const double s = (2.0 * (double)i + 1.0) / ATOMS, turn = 2.399963 * (double)i, z = 1.0 - s;
+        const double ring = sqrt(1.0 - z * z), clump = 3.0 * cbrt(0.5 * s), shell = 3.7;
+        const double at[3][3] = {
+            {clump * ring * cos(turn), clump * ring * sin(turn), clump * z},
+            {12.0 * z, 2.0 * sin(8.0 * s), 2.0 * cos(8.0 * s)},
+            {shell * ring * cos(turn), shell * ring * sin(turn), shell * z},
+        };
+        for (size_t k = 0; k < 3; ++k)
+            xyzr[4 * i + k] = at[form][k] + random_uniform(random, -0.1, 0.1);
+        xyzr[4 * i + 3] = random_uniform(random, 1.2, 1.7);
+    }
+    const double ion[4] = {9.0, 9.0, random_uniform(random, 9.0, 9.5), 0.3};
+    memcpy(xyzr + 4 * (ATOMS - 1), ion, sizeof ion);
+}
+
+enum { NOTHING, MOVE, SPLIT, MERGE, REMOVE, DETACH, HOLE, GROW, EVERYTHING, REORDER, CHANGES };
+
+/* Changes a model as that says, at a place of its own; returns how many quadrics it has then. */
+static size_t change(test_random *random, int what, ov_quadric *q, size_t count) {
+    const size_t i = (size_t)(random_bits(random) % count), j = count > 1 ? (i + 1) % count : i;
+    for (size_t k = 0; k < 3; ++k) {
+        const double by = random_uniform(random, -0.6, 0.6);
+        if (what == MOVE)
+            q[i].centre[k] += by;
+        if (what == DETACH)
+            q[i].centre[k] += 20.0 * by;
+        if (what == MERGE)
+            q[j].centre[k] = 0.5 * (q[i].centre[k] + q[j].centre[k]);
+        if (what == SPLIT) {
+            q[count] = k == 0 ? q[i] : q[count];
+            q[count].centre[k] += by;
+        }
+    }
+    if (what == HOLE)
+        q[i].amplitude *= 0.05;
+    if (what == GROW)
+        q[i].amplitude *= 1.5;
+    for (size_t n = 0; n < count && what == EVERYTHING; ++n)
+        q[n].amplitude *= 1.01;
+    if (what == MERGE || what == REMOVE || what == REORDER) {
+        const ov_quadric swap = q[i];
+        q[i] = q[count - 1];
+        q[count - 1] = swap;
+    }
+    return what == SPLIT                     ? count + 1
+           : what == MERGE || what == REMOVE ? count - (count > 1)
+                                             : count;
+}
+
+/* To the bit. */
+static void expect_same_judgement(const ov_judgement *got, const ov_judgement *wanted) {
+    assert_int_equal(got->valid, wanted->valid);
+    assert_memory_equal(&got->hausdorff, &wanted->hausdorff, sizeof got->hausdorff);
+    assert_memory_equal(&got->deviation, &wanted->deviation, sizeof got->deviation);
+    assert_memory_equal(&got->area_error, &wanted->area_error, sizeof got->area_error);
+    assert_memory_equal(&got->volume_ratio, &wanted->volume_ratio, sizeof got->volume_ratio);
+    assert_memory_equal(&got->score, &wanted->score, sizeof got->score);
+}
+
+/* Judges with both, in one way and in the other. */
+static size_t judge_twice(ovoid_context *context, ov_judge *kept, ov_judge *fresh,
+                          const ov_quadric *quadrics, size_t count, double least) {
+    ov_judge *const judges[2] = {kept, fresh};
+    ov_judgement whole[2], found[2];
+    ov_spot *spots[2];
+    size_t number[2];
+    for (int n = 0; n < 2; ++n) {
+        test_check(context, ov_judge_spots(judges[n], quadrics, count, least, 1.5, 1000, &found[n],
+                                           &spots[n], &number[n]));
+        test_check(context, ov_judge_model(judges[n], quadrics, count, &whole[n]));
+    }
+    expect_same_judgement(&found[0], &found[1]);
+    expect_same_judgement(&whole[0], &whole[1]);
+    assert_int_equal(number[0], number[1]);
+    assert_memory_equal(spots[0], spots[1], number[0] * sizeof *spots[0]);
+    free(spots[0]);
+    free(spots[1]);
+    return number[0];
+}
+
+/* What a judge keeps of the last model has no part in what it says of the next: it is what a judge
+ * made for that model alone says. Now and then it is stopped on the way. */
+static void the_last_model_is_forgotten(void **state) {
+    test_random random = {11};
+    countdown all = {.most = 1000000};
+    const ov_watch patient = {.go_on = count_down, .user = &all};
+    for (int form = 0; form < (int)test_size(3, 1); ++form) {
+        double xyzr[4 * ATOMS];
+        ov_quadric quadrics[ROOM];
+        size_t count = ATOMS, spots = 0;
+        ov_judge kept;
+        put_molecule(&random, form, xyzr);
+        for (size_t i = 0; i < ATOMS; ++i)
+            ov_quadric_of_atom(xyzr + 4 * i, 0.5, &quadrics[i]);
+        test_check(*state,
+                   ov_judge_create(*state, xyzr, ATOMS, 0.5, 1.0, spacing(), patient, &kept));
+        for (size_t n = 0; n < test_size(2 * CHANGES, 2); ++n) {
+            ov_judge fresh;
+            ov_judgement got;
+            count = change(&random, (int)(n % CHANGES), quadrics, count);
+            all.asked = 0;
+            all.most = (unsigned)n % 3;
+            if (n % 4 == 3) /* gives up on it after some questions */
+                test_refused(*state, ov_judge_model(&kept, quadrics, count / 2 + 1, &got),
+                             OVOID_ERROR_CANCELLED, "stopped");
+            all.most = 1000000;
+            judge_atoms(*state, xyzr, ATOMS, 0.5, 1.0, &fresh);
+            spots += judge_twice(*state, &kept, &fresh, quadrics, count, 0.2);
+            ov_judge_destroy(&fresh);
+        }
+        print_message("%zu spots\n", spots);
+        assert_true(spots > 0);
+        ov_judge_destroy(&kept);
+    }
+}
+
 /* ---- no surfaces -------------------------------------------------------------------------- */
 
 static void no_surface_of_the_original(void **state) {
@@ -230,15 +363,6 @@ static void no_surface_of_the_model(void **state) {
 }
 
 /* ---- stopping ----------------------------------------------------------------------------- */
-
-typedef struct countdown {
-    unsigned asked, most;
-} countdown;
-
-static bool count_down(void *user) {
-    countdown *const c = user;
-    return ++c->asked <= c->most;
-}
 
 /* Stopped at each of the questions in turn, and never where there are as many as that. */
 static void stopping(void **state) {
@@ -316,6 +440,7 @@ int main(void) {
         cmocka_unit_test(a_missing_piece),
         cmocka_unit_test(a_grown_piece),
         cmocka_unit_test(a_filled_cavity),
+        cmocka_unit_test(the_last_model_is_forgotten),
         cmocka_unit_test(no_surface_of_the_original),
         cmocka_unit_test(no_surface_of_the_model),
         cmocka_unit_test(stopping),

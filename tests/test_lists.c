@@ -304,6 +304,169 @@ static void lists_can_be_rebuilt(void **state) {
     bench_destroy(&b);
 }
 
+/* Either list by itself is what it is beside the other, in one structure after another size. */
+static void either_list_alone(void **state) {
+    bench b;
+    ov_lists alone = {0};
+    for (int round = 0; round < 4; ++round) {
+        pairs whole;
+        random_bench(&b, *state, MODEL_RANDOM, round == 2 ? 90 : 30,
+                     test_size(round == 1 ? 3000 : 1000, 200), 1e-4, 90 + (uint64_t)round);
+        read_pairs(*state, &b.lists, &whole);
+        alone.terms_only = round % 2 == 0;
+        alone.packs_only = !alone.terms_only;
+        test_check(*state, ov_lists_build(*state, &alone, &b.points, &b.terms, 0.0));
+        assert_int_equal(alone.items, whole.items);
+        const ov_buffer *const item = alone.terms_only ? &alone.term_item : &alone.pack_item;
+        const ov_buffer *const start = alone.terms_only ? &alone.term_start : &alone.pack_start;
+        const size_t starts = 1 + (alone.terms_only ? whole.terms : whole.packs);
+        uint32_t *const items = read_indices(*state, item, whole.items);
+        uint32_t *const begins = read_indices(*state, start, starts);
+        assert_memory_equal(items, alone.terms_only ? whole.term_item : whole.pack_item,
+                            whole.items * sizeof *items);
+        assert_memory_equal(begins, alone.terms_only ? whole.term_start : whole.pack_start,
+                            starts * sizeof *begins);
+        free(items);
+        free(begins);
+        free_pairs(&whole);
+        bench_destroy(&b);
+    }
+    ov_lists_destroy(&alone);
+}
+
+/* The twin of scan_lists: starts of `count` counts, and their sum. */
+static uint64_t starts_of(const uint32_t *counts, size_t count, uint32_t *start) {
+    uint64_t sum = 0;
+    for (size_t k = 0; k < count; ++k) {
+        start[k] = (uint32_t)sum;
+        sum += counts[k];
+    }
+    return sum;
+}
+
+enum {
+    SCAN_TERMS = 300,
+    SCAN_GROUPS = 21,
+    SCAN_BINS = SCAN_GROUPS * OV_BINS,
+    SCAN_STARTS = SCAN_BINS + SCAN_GROUPS + SCAN_TERMS
+};
+
+/* The kernel against its twin; zeros where there is no room. The counts are zero afterwards. */
+static void expect_starts(ovoid_context *context, size_t group,
+                          const uint32_t counts[1 + SCAN_STARTS], cl_uint4 room, bool fits) {
+    ov_kernel kernel = {0};
+    ov_buffer counted = {0}, place = {0}, start = {0}, totals = {0};
+    uint32_t wanted[SCAN_STARTS + 1];
+    const cl_uint terms = SCAN_TERMS, groups = SCAN_GROUPS;
+    const uint64_t entries = starts_of(counts + 1, SCAN_BINS, wanted);
+    starts_of(counts + 1 + SCAN_BINS, SCAN_GROUPS, wanted + SCAN_BINS);
+    const uint64_t items = starts_of(counts + 1 + SCAN_BINS + SCAN_GROUPS, SCAN_TERMS,
+                                     wanted + SCAN_BINS + SCAN_GROUPS);
+    wanted[SCAN_STARTS] = (uint32_t)items;
+    if (!fits)
+        memset(wanted, 0, sizeof wanted);
+    test_check(context, ov_kernel_create(context, "lists", "scan_lists", &kernel));
+    test_check(context, ov_buffer_put(context, &counted, counts, (1 + SCAN_STARTS) * sizeof *counts,
+                                      "counts"));
+    test_check(context,
+               ov_buffer_reserve(context, &place, (SCAN_BINS + SCAN_GROUPS) * 4, "starts"));
+    test_check(context, ov_buffer_reserve(context, &start, (SCAN_TERMS + 1) * 4, "starts"));
+    test_check(context, ov_buffer_reserve(context, &totals, 5 * 4, "totals"));
+    test_check(context, OV_LAUNCH(context, &kernel, group, group, OV_ARG(terms), OV_ARG(groups),
+                                  OV_ARG(room), OV_ARG(counted.memory), OV_ARG(place.memory),
+                                  OV_ARG(start.memory), OV_ARG(totals.memory)));
+    uint32_t *const total = read_indices(context, &totals, 5);
+    uint32_t *const places = read_indices(context, &place, SCAN_BINS + SCAN_GROUPS);
+    uint32_t *const starts = read_indices(context, &start, SCAN_TERMS + 1);
+    uint32_t *const left = read_indices(context, &counted, 1 + SCAN_STARTS);
+    assert_true(total[0] == counts[0] && total[1] == entries && total[4] == fits);
+    assert_true(total[2] == (uint32_t)items && total[3] == items >> 32);
+    assert_memory_equal(places, wanted, (SCAN_BINS + SCAN_GROUPS) * sizeof *wanted);
+    assert_memory_equal(starts, wanted + SCAN_BINS + SCAN_GROUPS,
+                        (SCAN_TERMS + 1) * sizeof *wanted);
+    for (size_t k = 0; k < 1 + SCAN_STARTS; ++k)
+        assert_int_equal(left[k], 0);
+    free(total);
+    free(places);
+    free(starts);
+    free(left);
+    ov_buffer *const buffers[] = {&counted, &place, &start, &totals};
+    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+        ov_buffer_destroy(buffers[k]);
+    ov_kernel_destroy(&kernel);
+}
+
+/* Whatever the work-group; with room to the last one, with one too little of each, and with sums
+ * beyond 32 bits. */
+static void counts_become_starts(void **state) {
+    const size_t groups[] = {1, 7, 32};
+    for (size_t n = 0; n < sizeof groups / sizeof *groups; ++n) {
+        test_random random = {n};
+        uint32_t counts[1 + SCAN_STARTS], unused[SCAN_STARTS];
+        for (size_t k = 0; k < 1 + SCAN_STARTS; ++k)
+            counts[k] = (uint32_t)(random_bits(&random) % 50);
+        const cl_uint4 exact = {
+            {counts[0], (cl_uint)starts_of(counts + 1, SCAN_BINS, unused),
+             (cl_uint)starts_of(counts + 1 + SCAN_BINS + SCAN_GROUPS, SCAN_TERMS, unused), 0}};
+        expect_starts(*state, groups[n], counts, exact, true);
+        for (int k = 0; k < 3; ++k) {
+            cl_uint4 less = exact;
+            --less.s[k];
+            if (exact.s[k] > 0)
+                expect_starts(*state, groups[n], counts, less, false);
+        }
+        for (size_t k = 1 + SCAN_BINS + SCAN_GROUPS; k < 1 + SCAN_STARTS; ++k)
+            counts[k] += 1u << 25;
+        const cl_uint4 all = {{UINT32_MAX, UINT32_MAX, UINT32_MAX, 0}};
+        expect_starts(*state, groups[n], counts, all, false);
+    }
+}
+
+static void expect_same_pairs(const pairs *a, const pairs *b) {
+    assert_true(a->items == b->items && a->terms == b->terms && a->packs == b->packs);
+    assert_memory_equal(a->term_start, b->term_start, (a->terms + 1) * sizeof *a->term_start);
+    assert_memory_equal(a->term_item, b->term_item, a->items * sizeof *a->term_item);
+    assert_memory_equal(a->pack_start, b->pack_start, (a->packs + 1) * sizeof *a->pack_start);
+    assert_memory_equal(a->pack_item, b->pack_item, a->items * sizeof *a->pack_item);
+}
+
+/* In memory that suffices the lists are the same; else they are empty, and said not to be whole. */
+static void built_without_waiting(void **state) {
+    bench small, large;
+    ov_lists lists = {0};
+    pairs wanted, got;
+    bool whole = false;
+    random_bench(&small, *state, MODEL_RANDOM, 5, test_size(1000, 200), 1e-4, 70);
+    random_bench(&large, *state, MODEL_RANDOM, test_size(200, 40), test_size(2000, 300), 1e-4, 71);
+    assert_false(ov_lists_built(&lists));
+    test_check(*state, ov_lists_build(*state, &lists, &small.points, &small.terms, 0.0));
+    assert_true(ov_lists_built(&lists));
+    const uint64_t reads = small.context->device->counts[OVOID_COUNT_BLOCKING_READS];
+    test_check(*state, ov_lists_begin(*state, &lists, &large.points, &large.terms, 0.0));
+    test_check(*state, ov_lists_end(*state, &lists, &whole));
+    assert_false(whole);
+    read_pairs(*state, &lists, &got);
+    assert_true(got.items == 0 && got.pack_start[got.packs] == 0 && got.term_start[got.terms] == 0);
+    free_pairs(&got);
+    test_check(*state, ov_lists_build(*state, &lists, &large.points, &large.terms, 0.0));
+    for (int round = 0; round < 2; ++round) { /* the larger one, then the smaller one */
+        const bench *const b = round == 0 ? &large : &small;
+        const uint64_t before = b->context->device->counts[OVOID_COUNT_BLOCKING_READS];
+        test_check(*state, ov_lists_begin(*state, &lists, &b->points, &b->terms, 0.0));
+        test_check(*state, ov_lists_end(*state, &lists, &whole));
+        assert_int_equal(b->context->device->counts[OVOID_COUNT_BLOCKING_READS], before);
+        assert_true(whole && before > reads);
+        read_pairs(*state, &b->lists, &wanted);
+        read_pairs(*state, &lists, &got);
+        expect_same_pairs(&got, &wanted);
+        free_pairs(&wanted);
+        free_pairs(&got);
+    }
+    ov_lists_destroy(&lists);
+    bench_destroy(&small);
+    bench_destroy(&large);
+}
+
 /* Entries come to their group in whatever order work-items happen to run; here, in the worst one.
  */
 static void lists_are_sorted_on_the_device(void **state) {
@@ -429,6 +592,9 @@ int main(void) {
         cmocka_unit_test(terms_below_the_cut_off),
         cmocka_unit_test(nothing_to_pair),
         cmocka_unit_test(lists_can_be_rebuilt),
+        cmocka_unit_test(either_list_alone),
+        cmocka_unit_test(counts_become_starts),
+        cmocka_unit_test(built_without_waiting),
         cmocka_unit_test(lists_are_sorted_on_the_device),
         cmocka_unit_test(wide_terms_find_room),
         cmocka_unit_test(lists_are_reproducible),

@@ -51,8 +51,8 @@ static void subject_free(subject *s) {
 
 static ovoid_status export_subject(ovoid_context *context, const subject *s, const char *path,
                                    const ovoid_export_options *options) {
-    return s->model ? ovoid_model_export(context, s->model, path, options)
-                    : ovoid_molecule_export(context, s->molecule, decay, path, options);
+    return s->model ? once_model_export(context, s->model, path, options)
+                    : once_molecule_export(context, s->molecule, decay, path, options);
 }
 
 /* ---- readers ------------------------------------------------------------------------------ */

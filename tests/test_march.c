@@ -280,7 +280,7 @@ static ovoid_mesh *mesh_atoms(ovoid_context *context, const double *xyzr, size_t
     ovoid_molecule *molecule = NULL;
     ovoid_mesh *mesh = NULL;
     test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
-    test_check(context, ovoid_molecule_mesh(context, molecule, decay, options, &mesh));
+    test_check(context, once_molecule_mesh(context, molecule, decay, options, &mesh));
     ovoid_molecule_destroy(&molecule);
     return mesh;
 }
@@ -300,7 +300,7 @@ static ovoid_mesh *expect_atoms(ovoid_context *context, const double *xyzr, size
 static ovoid_mesh_options options_of(double isovalue, double spacing, ovoid_vertex_rule rule) {
     ovoid_mesh_options options;
     ovoid_mesh_options_init(&options, sizeof options);
-    assert_true(options.isovalue == 1.0 && options.spacing == OVOID_DEFAULT_MESH_SPACING);
+    assert_true(options.isovalue == 0.0 && options.spacing == OVOID_DEFAULT_MESH_SPACING);
     assert_true(options.vertices == OVOID_VERTEX_EXACT);
     options.isovalue = isovalue;
     options.spacing = spacing;
@@ -367,7 +367,7 @@ static void spheres_and_ellipsoids_have_their_measures(void **state) {
         volume *= sqrt(log(5.0) / ellipsoid.decay[k]);
     ov_quadric_of_ellipsoid(&ellipsoid, &quadric);
     test_check(*state, ovoid_model_create(*state, &ellipsoid, 1, 0.5, 1.0, &model));
-    test_check(*state, ovoid_model_mesh(*state, model, &options, &mesh));
+    test_check(*state, once_model_mesh(*state, model, &options, &mesh));
     assert_int_equal(expect_surface(mesh, &quadric, 1, &options), 2);
     expect_near(ovoid_mesh_smooth_volume(mesh) / volume, 1.0, 1e-3, "volume");
     ovoid_mesh_destroy(&mesh);
@@ -446,7 +446,7 @@ static void flat_and_thin_models_stay_closed(void **state) {
         const ovoid_mesh_options options = options_of(isovalue, spacing, OVOID_VERTEX_EXACT);
         random_ellipsoids(&random, kinds[n], 4.0, ellipsoids, 12);
         test_check(*state, ovoid_model_create(*state, ellipsoids, 12, 0.5, 1.0, &model));
-        test_check(*state, ovoid_model_mesh(*state, model, &options, &mesh));
+        test_check(*state, once_model_mesh(*state, model, &options, &mesh));
         print_message("%s: %zu vertices, %zu components\n", model_kind_name(kinds[n]),
                       ovoid_mesh_vertices(mesh), ovoid_mesh_components(mesh));
         expect_closed(mesh);
@@ -462,12 +462,12 @@ static void a_vertex_without_gradient_has_a_normal(void **state) {
     ovoid_molecule *molecule = NULL;
     ovoid_mesh *mesh = NULL;
     test_check(*state, ovoid_molecule_create(*state, xyzr, 2, &molecule));
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, origin, 1, &c, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, origin, 1, &c, NULL));
     for (int rule = 0; rule < 2; ++rule) {
         const ovoid_mesh_options options = options_of(c, 0.5, (ovoid_vertex_rule)rule);
         size_t at_origin = 0;
         double sum[3] = {0};
-        test_check(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
+        test_check(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
         expect_closed(mesh);
         for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
             const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
@@ -758,7 +758,7 @@ static void light_meshes_are_the_same(void **state) {
     ovoid_mesh *full = NULL, *light = NULL;
     ov_body bodies[2];
     test_check(*state, ovoid_molecule_create(*state, xyzr, 2, &molecule));
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, at, 1, &c, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, at, 1, &c, NULL));
     ovoid_molecule_destroy(&molecule);
     for (size_t i = 0; i < 2; ++i)
         ov_body_of_atom(xyzr + 4 * i, 0.5, &bodies[i]);
@@ -876,7 +876,7 @@ static void small_ellipsoids_have_their_volume(void **state) {
         volume += 4.0 / 3.0 * PI * pow(log(two[i].amplitude), 1.5) /
                   sqrt(two[i].decay[0] * two[i].decay[1] * two[i].decay[2]);
     test_check(*state, ovoid_model_create(*state, two, 2, 0.5, 1.0, &model));
-    test_check(*state, ovoid_model_mesh(*state, model, &options, &mesh));
+    test_check(*state, once_model_mesh(*state, model, &options, &mesh));
     assert_int_equal(ovoid_mesh_components(mesh), 2);
     assert_int_equal(expect_closed(mesh), 4);
     expect_near(ovoid_mesh_smooth_volume(mesh) / volume, 1.0, 3e-3, "volume");
@@ -1013,45 +1013,46 @@ static void refusals(void **state) {
     test_check(*state, ovoid_molecule_create(*state, xyzr, 1, &molecule));
     test_check(*state, ovoid_model_create(*state, &huge, 1, 0.5, 1.0, &model));
     ovoid_mesh_options_init(NULL, sizeof options);
-    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, NULL, &mesh),
+    test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, NULL, &mesh),
                  OVOID_ERROR_ARGUMENT, "NULL");
-    test_refused(*state, ovoid_model_mesh(*state, NULL, &options, &mesh), OVOID_ERROR_ARGUMENT,
+    test_refused(*state, once_model_mesh(*state, NULL, &options, &mesh), OVOID_ERROR_ARGUMENT,
                  "NULL");
-    test_refused(*state, ovoid_molecule_mesh(*state, molecule, -0.5, &options, &mesh),
+    test_refused(*state, once_molecule_mesh(*state, molecule, -0.5, &options, &mesh),
                  OVOID_ERROR_ARGUMENT, "decay");
     const double bad[] = {0.0, -1.0, NAN, INFINITY};
     for (size_t k = 0; k < 4; ++k) {
-        options = options_of(bad[k], 0.5, OVOID_VERTEX_EXACT);
-        test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+        options =
+            options_of(bad[k] == 0.0 ? -0.5 : bad[k], 0.5, OVOID_VERTEX_EXACT); /* 0: default */
+        test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                      OVOID_ERROR_ARGUMENT, "isovalue");
         options = options_of(1.0, bad[k], OVOID_VERTEX_EXACT);
-        test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+        test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                      OVOID_ERROR_ARGUMENT, "spacing");
     }
     options = options_of(1.0, 0.5, (ovoid_vertex_rule)7);
-    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+    test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                  OVOID_ERROR_ARGUMENT, "vertex rule");
     options = options_of(50.0, 0.5, OVOID_VERTEX_EXACT);
-    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+    test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                  OVOID_ERROR_EMPTY, "nowhere above the isovalue 50");
     options = options_of(3.0, 1000.0, OVOID_VERTEX_EXACT);
-    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+    test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                  OVOID_ERROR_EMPTY, "largest value of the field at a lattice point is 2.87");
     options = options_of(1.0, 5e-4, OVOID_VERTEX_EXACT);
-    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+    test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                  OVOID_ERROR_LIMIT,
                  "points at a spacing of 0.0005 angstrom, more than 2e+10; use a");
     options = options_of(0.999, 0.5, OVOID_VERTEX_EXACT);
-    test_refused(*state, ovoid_molecule_mesh(*state, molecule, 1e-9, &options, &mesh),
+    test_refused(*state, once_molecule_mesh(*state, molecule, 1e-9, &options, &mesh),
                  OVOID_ERROR_LIMIT, "points at a spacing of 0.5 angstrom, more than 2e+10; use a");
     const double spacings[] = {1e-5, 1e-9, 1e-300};
     for (size_t k = 0; k < 3; ++k) {
         options = options_of(1.0, spacings[k], OVOID_VERTEX_EXACT);
-        test_refused(*state, ovoid_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+        test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
                      OVOID_ERROR_LIMIT, "spacing");
     }
     options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
-    test_refused(*state, ovoid_model_mesh(*state, model, &options, &mesh), OVOID_ERROR_NUMERIC,
+    test_refused(*state, once_model_mesh(*state, model, &options, &mesh), OVOID_ERROR_NUMERIC,
                  "ellipsoid 1 is degenerate");
     assert_null(mesh);
     ovoid_molecule_destroy(&molecule);

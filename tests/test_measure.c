@@ -43,7 +43,7 @@ static void test_closed_forms(void **state) {
     ovoid_measure_options_init(&options, sizeof options);
     assert_true(options.distances && options.vertices == OVOID_VERTEX_EXACT);
     expect_near(options.spacing, 0.5, 0.0, "default spacing");
-    expect_near(options.isovalue, 1.0, 0.0, "default isovalue");
+    expect_near(options.isovalue, 0.0, 0.0, "default isovalue");
     options.spacing = test_small() ? 0.8 : 0.3;
     const double share = test_small() ? 0.02 : 1e-3;
     for (int k = 0; k < (test_small() ? 1 : 2); ++k) {
@@ -57,7 +57,7 @@ static void test_closed_forms(void **state) {
         const double area = 4.0 * PI * radius * radius, volume = area * radius / 3.0;
         const double model_area = ellipsoid_area(axes);
         const double model_volume = 4.0 / 3.0 * PI * axes[0] * axes[1] * axes[2];
-        test_check(context, ovoid_measure(context, molecule, model, &options, &got));
+        test_check(context, once_measure(context, molecule, model, &options, &got));
         expect_share(got.area.original, area, share, "area of an atom");
         expect_share(got.volume.original, volume, share, "volume of an atom");
         expect_share(got.area.sparse, model_area, share, "area of an ellipsoid");
@@ -98,7 +98,7 @@ static void test_same_surface(void **state) {
     ovoid_measures_init(&got, sizeof got);
     ovoid_measure_options_init(&options, sizeof options);
     options.spacing = test_small() ? 0.9 : 0.5;
-    test_check(context, ovoid_measure(context, molecule, model, &options, &got));
+    test_check(context, once_measure(context, molecule, model, &options, &got));
     expect_near(got.area.error, 0.0, 1e-6, "area");
     expect_near(got.volume.error, 0.0, 1e-6, "volume");
     expect_near(got.distances.hausdorff, 0.0, 1e-4, "hausdorff");
@@ -108,12 +108,12 @@ static void test_same_surface(void **state) {
 
     options.distances = false;
     const double area = got.area.original;
-    test_check(context, ovoid_measure(context, molecule, model, &options, &got));
+    test_check(context, once_measure(context, molecule, model, &options, &got));
     expect_near(got.area.original, area, 0.0, "the area of a second run");
     assert_true(isnan(got.distances.hausdorff) && isnan(got.deviation)); /* not asked for */
 
     options.vertices = OVOID_VERTEX_LINEAR; /* flat triangles of interpolated vertices: elsewhere */
-    test_check(context, ovoid_measure(context, molecule, model, &options, &got));
+    test_check(context, once_measure(context, molecule, model, &options, &got));
     assert_true(fabs(got.area.original - area) > 1e-4 * area);
     expect_near(got.area.original / area, 1.0, 0.06, "area of flat triangles");
     ovoid_molecule_destroy(&molecule);
@@ -161,19 +161,19 @@ static void test_refusals(void **state) {
     ovoid_measure_options options;
     ovoid_measures got = {.size = sizeof got, .components_original = 42};
     ovoid_measure_options_init(&options, sizeof options);
-    test_refused(context, ovoid_measure(context, molecule, model, &options, &got),
-                 OVOID_ERROR_EMPTY, "the surface of the model: ");
+    test_refused(context, once_measure(context, molecule, model, &options, &got), OVOID_ERROR_EMPTY,
+                 "the surface of the model: ");
     options.isovalue = 100.0;
-    test_refused(context, ovoid_measure(context, molecule, model, &options, &got),
-                 OVOID_ERROR_EMPTY, "the surface of the molecule: ");
+    test_refused(context, once_measure(context, molecule, model, &options, &got), OVOID_ERROR_EMPTY,
+                 "the surface of the molecule: ");
     options.isovalue = NAN;
-    test_refused(context, ovoid_measure(context, molecule, model, &options, &got),
+    test_refused(context, once_measure(context, molecule, model, &options, &got),
                  OVOID_ERROR_ARGUMENT, "isovalue");
     ovoid_measure_options_init(&options, sizeof options);
     options.spacing = 0.0;
-    test_refused(context, ovoid_measure(context, molecule, model, &options, &got),
+    test_refused(context, once_measure(context, molecule, model, &options, &got),
                  OVOID_ERROR_ARGUMENT, "spacing");
-    test_refused(context, ovoid_measure(context, NULL, model, &options, &got), OVOID_ERROR_ARGUMENT,
+    test_refused(context, once_measure(context, NULL, model, &options, &got), OVOID_ERROR_ARGUMENT,
                  "is NULL");
     assert_int_equal(got.components_original, 42);
     ovoid_molecule_destroy(&molecule);
@@ -210,7 +210,7 @@ static void test_table2(void **state) {
         ovoid_mesh_options_init(&options, sizeof options);
         options.vertices = OVOID_VERTEX_LINEAR;
         test_check(context, ovoid_molecule_read(context, path, OVOID_MOLECULE_AUTO, &molecule));
-        test_check(context, ovoid_molecule_mesh(context, molecule, 0.5, &options, &mesh));
+        test_check(context, once_molecule_mesh(context, molecule, 0.5, &options, &mesh));
         print_message("%s: ", rows[i].name);
         expect_share(ovoid_mesh_area(mesh), rows[i].area, rows[i].share, "area");
         print_message("%s: ", rows[i].name);
@@ -218,7 +218,7 @@ static void test_table2(void **state) {
         /* The smooth surface is a little smaller than what isosurface makes of it. */
         ovoid_mesh_destroy(&mesh);
         options.vertices = OVOID_VERTEX_EXACT;
-        test_check(context, ovoid_molecule_mesh(context, molecule, 0.5, &options, &mesh));
+        test_check(context, once_molecule_mesh(context, molecule, 0.5, &options, &mesh));
         expect_near(ovoid_mesh_smooth_area(mesh) / rows[i].area, 1.0, 0.015, "smooth area");
         expect_near(ovoid_mesh_smooth_volume(mesh) / rows[i].volume, 1.0, 0.01, "smooth volume");
         ovoid_mesh_destroy(&mesh);

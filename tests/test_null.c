@@ -4,6 +4,7 @@
  */
 #include "support.h"
 
+#include "ovoid/opencl.h"
 #include "ovoid/ovoid.h"
 
 #include <ctype.h>
@@ -16,6 +17,7 @@ typedef struct subject {
     size_t count;
     ovoid_molecule *molecule;
     ovoid_model *model;
+    ovoid_field *field;
     ovoid_mesh *mesh;
     ovoid_image *image;
 } subject;
@@ -66,6 +68,7 @@ static int make_subject(void **state) {
     return ovoid_context_create(&all.context) == OVOID_OK &&
                    ovoid_molecule_create(all.context, xyzr, 1, &all.molecule) == OVOID_OK &&
                    ovoid_model_create(all.context, &one, 1, 0.5, 1.0, &all.model) == OVOID_OK &&
+                   ovoid_field_of_model(all.context, all.model, &all.field) == OVOID_OK &&
                    ovoid_mesh_create(all.context, corners_xyz, NULL, 3, corners, 1, &all.mesh) ==
                        OVOID_OK &&
                    ovoid_image_create(all.context, 1, 1, pixel, &all.image) == OVOID_OK
@@ -77,6 +80,7 @@ static int drop_subject(void **state) {
     (void)state;
     ovoid_image_destroy(&all.image);
     ovoid_mesh_destroy(&all.mesh);
+    ovoid_field_destroy(&all.field);
     ovoid_model_destroy(&all.model);
     ovoid_molecule_destroy(&all.molecule);
     ovoid_context_destroy(&all.context);
@@ -113,6 +117,7 @@ static void destroyers(void **state) {
     ovoid_context *context = NULL;
     ovoid_molecule *molecule = NULL;
     ovoid_model *model = NULL;
+    ovoid_field *field = NULL;
     ovoid_mesh *mesh = NULL;
     ovoid_image *image = NULL;
     ovoid_file *file = NULL;
@@ -122,6 +127,8 @@ static void destroyers(void **state) {
     DOES_NOTHING(ovoid_molecule_destroy, &molecule);
     DOES_NOTHING(ovoid_model_destroy, NULL);
     DOES_NOTHING(ovoid_model_destroy, &model);
+    DOES_NOTHING(ovoid_field_destroy, NULL);
+    DOES_NOTHING(ovoid_field_destroy, &field);
     DOES_NOTHING(ovoid_mesh_destroy, NULL);
     DOES_NOTHING(ovoid_mesh_destroy, &mesh);
     DOES_NOTHING(ovoid_image_destroy, NULL);
@@ -246,14 +253,20 @@ static void fields_and_models(void **state) {
     ovoid_fit_options options;
     double value;
     ovoid_fit_options_init(&options, sizeof options);
-    REFUSED(ovoid_molecule_field, context, NULL, all.molecule, 0.5, xyzr, 1, &value, NULL);
-    REFUSED(ovoid_molecule_field, molecule, c, NULL, 0.5, xyzr, 1, &value, NULL);
-    REFUSED(ovoid_molecule_field, xyz, c, all.molecule, 0.5, NULL, 1, &value, NULL);
-    REFUSED(ovoid_molecule_field, value, c, all.molecule, 0.5, xyzr, 1, NULL, NULL);
-    REFUSED(ovoid_model_field, context, NULL, all.model, xyzr, 1, &value, NULL);
-    REFUSED(ovoid_model_field, model, c, NULL, xyzr, 1, &value, NULL);
-    REFUSED(ovoid_model_field, xyz, c, all.model, NULL, 1, &value, NULL);
-    REFUSED(ovoid_model_field, value, c, all.model, xyzr, 1, NULL, NULL);
+    ovoid_field *field;
+    REFUSED(ovoid_field_of_molecule, context, NULL, all.molecule, 0.5, 1.0, &field);
+    REFUSED(ovoid_field_of_molecule, molecule, c, NULL, 0.5, 1.0, &field);
+    REFUSED(ovoid_field_of_molecule, field, c, all.molecule, 0.5, 1.0, NULL);
+    REFUSED(ovoid_field_of_model, context, NULL, all.model, &field);
+    REFUSED(ovoid_field_of_model, model, c, NULL, &field);
+    REFUSED(ovoid_field_of_model, field, c, all.model, NULL);
+    REFUSED(ovoid_field_evaluate, context, NULL, all.field, xyzr, 1, &value, NULL);
+    REFUSED(ovoid_field_evaluate, field, c, NULL, xyzr, 1, &value, NULL);
+    REFUSED(ovoid_field_evaluate, xyz, c, all.field, NULL, 1, &value, NULL);
+    REFUSED(ovoid_field_evaluate, value, c, all.field, xyzr, 1, NULL, NULL);
+    ANSWERS(0, ovoid_field_terms, NULL);
+    UNKNOWN(ovoid_field_decay);
+    UNKNOWN(ovoid_field_isovalue);
     REFUSED(ovoid_model_create, context, NULL, &one, 1, 0.5, 1.0, &made);
     REFUSED(ovoid_model_create, ellipsoids, c, NULL, 1, 0.5, 1.0, &made);
     REFUSED(ovoid_model_create, model, c, &one, 1, 0.5, 1.0, NULL);
@@ -281,6 +294,28 @@ static void fields_and_models(void **state) {
     REFUSED(ovoid_fit, model, c, all.molecule, &options, NULL, NULL);
 }
 
+/* Handles that are never looked at: another argument is NULL. */
+static void opencl(void **state) {
+    (void)state;
+    ovoid_context *const c = all.context;
+    cl_context const h = (cl_context)(void *)&all;
+    cl_device_id const d = (cl_device_id)(void *)&all;
+    cl_command_queue const q = (cl_command_queue)(void *)&all;
+    cl_mem const m = (cl_mem)(void *)&all;
+    REFUSED(ovoid_context_open_opencl, context, NULL, h, d, q);
+    REFUSED(ovoid_context_open_opencl, opencl, c, NULL, d, q);
+    REFUSED(ovoid_context_open_opencl, device, c, h, NULL, q);
+    REFUSED(ovoid_context_open_opencl, queue, c, h, d, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, context, NULL, all.field, xyzr, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, field, c, NULL, xyzr, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, xyz, c, all.field, NULL, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_opencl, value, c, all.field, xyzr, 1, NULL, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, context, NULL, all.field, m, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, field, c, NULL, m, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, xyz, c, all.field, NULL, 1, m, NULL);
+    REFUSED(ovoid_field_evaluate_buffer, value, c, all.field, m, 1, NULL, NULL);
+}
+
 static void meshes(void **state) {
     (void)state;
     ovoid_context *const c = all.context;
@@ -292,14 +327,10 @@ static void meshes(void **state) {
     const double *const xyz = corners_xyz;
     ovoid_mesh_options_init(&options, sizeof options);
     ovoid_measure_options_init(&measuring, sizeof measuring);
-    REFUSED(ovoid_molecule_mesh, context, NULL, all.molecule, 0.5, &options, &made);
-    REFUSED(ovoid_molecule_mesh, molecule, c, NULL, 0.5, &options, &made);
-    REFUSED(ovoid_molecule_mesh, options, c, all.molecule, 0.5, NULL, &made);
-    REFUSED(ovoid_molecule_mesh, mesh, c, all.molecule, 0.5, &options, NULL);
-    REFUSED(ovoid_model_mesh, context, NULL, all.model, &options, &made);
-    REFUSED(ovoid_model_mesh, model, c, NULL, &options, &made);
-    REFUSED(ovoid_model_mesh, options, c, all.model, NULL, &made);
-    REFUSED(ovoid_model_mesh, mesh, c, all.model, &options, NULL);
+    REFUSED(ovoid_field_mesh, context, NULL, all.field, &options, &made);
+    REFUSED(ovoid_field_mesh, field, c, NULL, &options, &made);
+    REFUSED(ovoid_field_mesh, options, c, all.field, NULL, &made);
+    REFUSED(ovoid_field_mesh, mesh, c, all.field, &options, NULL);
     REFUSED(ovoid_mesh_create, context, NULL, xyz, NULL, 3, corners, 1, &made);
     REFUSED(ovoid_mesh_create, xyz, c, NULL, NULL, 3, corners, 1, &made);
     REFUSED(ovoid_mesh_create, corners, c, xyz, NULL, 3, NULL, 1, &made);
@@ -323,11 +354,11 @@ static void meshes(void **state) {
     REFUSED(ovoid_mesh_distances, a, c, NULL, all.mesh, false, &distances, NULL);
     REFUSED(ovoid_mesh_distances, b, c, all.mesh, NULL, false, &distances, NULL);
     REFUSED(ovoid_mesh_distances, distances, c, all.mesh, all.mesh, false, NULL, NULL);
-    REFUSED(ovoid_measure, context, NULL, all.molecule, all.model, &measuring, &measures);
-    REFUSED(ovoid_measure, molecule, c, NULL, all.model, &measuring, &measures);
-    REFUSED(ovoid_measure, model, c, all.molecule, NULL, &measuring, &measures);
-    REFUSED(ovoid_measure, options, c, all.molecule, all.model, NULL, &measures);
-    REFUSED(ovoid_measure, measures, c, all.molecule, all.model, &measuring, NULL);
+    REFUSED(ovoid_measure, context, NULL, all.field, all.field, &measuring, &measures);
+    REFUSED(ovoid_measure, original, c, NULL, all.field, &measuring, &measures);
+    REFUSED(ovoid_measure, sparse, c, all.field, NULL, &measuring, &measures);
+    REFUSED(ovoid_measure, options, c, all.field, all.field, NULL, &measures);
+    REFUSED(ovoid_measure, measures, c, all.field, all.field, &measuring, NULL);
 }
 
 static void exports_and_pictures(void **state) {
@@ -337,19 +368,16 @@ static void exports_and_pictures(void **state) {
     ovoid_picture_options options;
     const uint8_t *const pixels = pixel;
     ovoid_picture_options_init(&options, sizeof options);
-    REFUSED(ovoid_model_export, context, NULL, all.model, "a.bild", NULL);
-    REFUSED(ovoid_model_export, model, c, NULL, "a.bild", NULL);
-    REFUSED(ovoid_model_export, path, c, all.model, NULL, NULL);
-    REFUSED(ovoid_molecule_export, context, NULL, all.molecule, 0.5, "a.mrc", NULL);
-    REFUSED(ovoid_molecule_export, molecule, c, NULL, 0.5, "a.mrc", NULL);
-    REFUSED(ovoid_molecule_export, path, c, all.molecule, 0.5, NULL, NULL);
+    REFUSED(ovoid_field_export, context, NULL, all.field, "a.bild", NULL);
+    REFUSED(ovoid_field_export, field, c, NULL, "a.bild", NULL);
+    REFUSED(ovoid_field_export, path, c, all.field, NULL, NULL);
     ANSWERS(OVOID_EXPORT_AUTO, ovoid_export_format_find, NULL);
-    REFUSED(ovoid_render, context, NULL, all.molecule, 0.5, all.model, &options, &made);
-    REFUSED(ovoid_render, options, c, all.molecule, 0.5, all.model, NULL, &made);
-    REFUSED(ovoid_render, image, c, all.molecule, 0.5, all.model, &options, NULL);
-    REFUSED(ovoid_render, molecule, c, NULL, 0.5, all.model, &options, &made);
+    REFUSED(ovoid_render, context, NULL, all.field, all.field, &options, &made);
+    REFUSED(ovoid_render, options, c, all.field, all.field, NULL, &made);
+    REFUSED(ovoid_render, image, c, all.field, all.field, &options, NULL);
+    REFUSED(ovoid_render, original, c, NULL, all.field, &options, &made);
     options.view = OVOID_VIEW_MODEL;
-    REFUSED(ovoid_render, model, c, all.molecule, 0.5, NULL, &options, &made);
+    REFUSED(ovoid_render, model, c, all.field, NULL, &options, &made);
     REFUSED(ovoid_image_create, context, NULL, 1, 1, pixels, &made);
     REFUSED(ovoid_image_create, pixels, c, 1, 1, NULL, &made);
     REFUSED(ovoid_image_create, image, c, 1, 1, pixels, NULL);
@@ -396,7 +424,7 @@ static void no_function_is_left_out(void **state) {
     (void)state;
     static const char *const headers[] = {"context", "export",   "field",   "file",
                                           "fit",     "fitter",   "measure", "mesh",
-                                          "model",   "molecule", "picture"};
+                                          "model",   "molecule", "opencl",  "picture"};
     size_t found = 0;
     for (size_t i = 0; i < sizeof headers / sizeof *headers; ++i) {
         char path[4096];
@@ -416,6 +444,7 @@ int main(void) {
         cmocka_unit_test(molecules),
         cmocka_unit_test(files),
         cmocka_unit_test(fields_and_models),
+        cmocka_unit_test(opencl),
         cmocka_unit_test(meshes),
         cmocka_unit_test(exports_and_pictures),
         cmocka_unit_test(no_function_is_left_out),

@@ -212,7 +212,7 @@ static void kernels_are_told_apart(void **state) {
     test_check(context, ovoid_molecule_create(context, xyzr, test_size(200, 20), &molecule));
     test_check(context, ovoid_context_profile(context, true));
     launch(context, 1);
-    test_check(context, ovoid_molecule_field(context, molecule, 0.5, xyz, count, value, NULL));
+    test_check(context, once_molecule_field(context, molecule, 0.5, xyz, count, value, NULL));
     ovoid_kernel_time *times = NULL;
     size_t kernels = 0, launches = 0;
     test_check(context, ovoid_context_kernel_times(context, &times, &kernels));

@@ -334,7 +334,7 @@ static void protein_is_hit_where_phi_is_c(void **state) {
             ++met;
         }
     assert_true(met > 12000);
-    test_check(*state, ovoid_molecule_field(*state, molecule, 0.5, points, met, value, NULL));
+    test_check(*state, once_molecule_field(*state, molecule, 0.5, points, met, value, NULL));
     double worst = 0.0;
     for (size_t k = 0; k < met; ++k)
         worst = fmax(worst, fabs(value[k] - 1.0));
@@ -472,7 +472,7 @@ static const uint8_t *pixel_of(const ovoid_image *image, uint32_t x, uint32_t y)
 static ovoid_image *render(ovoid_context *context, const ovoid_molecule *molecule,
                            const ovoid_model *model, const ovoid_picture_options *options) {
     ovoid_image *image = NULL;
-    test_check(context, ovoid_render(context, molecule, 0.5, model, options, &image));
+    test_check(context, once_render(context, molecule, 0.5, model, options, &image));
     assert_int_equal(ovoid_image_width(image), options->width);
     assert_int_equal(ovoid_image_height(image), options->height);
     return image;
@@ -723,7 +723,7 @@ static void bad_arguments_are_refused(void **state) {
     ovoid_picture_options o = good;
 #define REFUSED(part)                                                                              \
     do {                                                                                           \
-        test_refused(*state, ovoid_render(*state, molecule, 0.5, NULL, &o, &image),                \
+        test_refused(*state, once_render(*state, molecule, 0.5, NULL, &o, &image),                 \
                      OVOID_ERROR_ARGUMENT, part);                                                  \
         assert_null(image);                                                                        \
         o = good;                                                                                  \
@@ -736,8 +736,8 @@ static void bad_arguments_are_refused(void **state) {
     REFUSED("9 rays across a pixel");
     o.isovalue = NAN;
     REFUSED("isovalue nan");
-    o.isovalue = 0.0;
-    REFUSED("isovalue 0");
+    o.isovalue = -1.0;
+    REFUSED("isovalue -1");
     o.across = -1.0;
     REFUSED("across");
     o.range = INFINITY;
@@ -747,16 +747,16 @@ static void bad_arguments_are_refused(void **state) {
     o.rotation[2] = INFINITY;
     REFUSED("not finite");
     o.view = OVOID_VIEW_MODEL;
-    REFUSED("needs a model");
+    REFUSED("needs the model's");
     o.view = (ovoid_view)17;
     REFUSED("no view 17");
 #undef REFUSED
     o.view = OVOID_VIEW_ORIGINAL;
-    test_refused(*state, ovoid_render(*state, NULL, 0.5, NULL, &o, &image), OVOID_ERROR_ARGUMENT,
-                 "needs a molecule");
-    test_refused(*state, ovoid_render(*state, molecule, 0.0, NULL, &o, &image),
-                 OVOID_ERROR_ARGUMENT, "decay 0");
-    test_refused(*state, ovoid_render(*state, molecule, 0.5, NULL, NULL, &image),
+    test_refused(*state, once_render(*state, NULL, 0.5, NULL, &o, &image), OVOID_ERROR_ARGUMENT,
+                 "needs the original's");
+    test_refused(*state, once_render(*state, molecule, 0.0, NULL, &o, &image), OVOID_ERROR_ARGUMENT,
+                 "decay 0");
+    test_refused(*state, once_render(*state, molecule, 0.5, NULL, NULL, &image),
                  OVOID_ERROR_ARGUMENT, "NULL");
     ovoid_image_destroy(&image);
     ovoid_image_destroy(NULL);

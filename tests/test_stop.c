@@ -83,13 +83,13 @@ static ovoid_status mesh_molecule(void) {
     ovoid_mesh_options options;
     ovoid_mesh_options_init(&options, sizeof options);
     MAKES(ovoid_mesh, m, ovoid_mesh_destroy,
-          ovoid_molecule_mesh(s.context, s.molecule, 0.5, &options, &m));
+          once_molecule_mesh(s.context, s.molecule, 0.5, &options, &m));
 }
 
 static ovoid_status mesh_model(void) {
     ovoid_mesh_options options;
     ovoid_mesh_options_init(&options, sizeof options);
-    MAKES(ovoid_mesh, m, ovoid_mesh_destroy, ovoid_model_mesh(s.context, s.model, &options, &m));
+    MAKES(ovoid_mesh, m, ovoid_mesh_destroy, once_model_mesh(s.context, s.model, &options, &m));
 }
 
 static ovoid_status make_mesh(void) {
@@ -125,7 +125,7 @@ static ovoid_status measure(void) {
     before.size = sizeof before;
     memcpy(&after, &before, sizeof after);
     ovoid_measure_options_init(&options, sizeof options);
-    const ovoid_status status = ovoid_measure(s.context, s.molecule, s.model, &options, &after);
+    const ovoid_status status = once_measure(s.context, s.molecule, s.model, &options, &after);
     UNTOUCHED(before, after);
 }
 
@@ -139,9 +139,9 @@ static ovoid_status field(bool of_model) {
     memset(&before, 0x5a, sizeof before);
     after = before;
     const ovoid_status status =
-        of_model ? ovoid_model_field(s.context, s.model, xyz, POINTS, after.value, after.gradient)
-                 : ovoid_molecule_field(s.context, s.molecule, 0.5, xyz, POINTS, after.value,
-                                        after.gradient);
+        of_model ? once_model_field(s.context, s.model, xyz, POINTS, after.value, after.gradient)
+                 : once_molecule_field(s.context, s.molecule, 0.5, xyz, POINTS, after.value,
+                                       after.gradient);
     UNTOUCHED(before, after);
 }
 
@@ -160,7 +160,7 @@ static ovoid_status render(ovoid_view view) {
     options.width = 60;
     options.height = 30;
     MAKES(ovoid_image, image, ovoid_image_destroy,
-          ovoid_render(s.context, s.molecule, 0.5, s.model, &options, &image));
+          once_render(s.context, s.molecule, 0.5, s.model, &options, &image));
 }
 
 static ovoid_status render_panel(void) {
@@ -201,13 +201,13 @@ static ovoid_status export_model(const char *path) {
     ovoid_export_options options;
     ovoid_export_options_init(&options, sizeof options);
     options.spacing = 1.0;
-    return ovoid_model_export(s.context, s.model, path, &options);
+    return once_model_export(s.context, s.model, path, &options);
 }
 static ovoid_status export_molecule(const char *path) {
     ovoid_export_options options;
     ovoid_export_options_init(&options, sizeof options);
     options.spacing = 1.0;
-    return ovoid_molecule_export(s.context, s.molecule, 0.5, path, &options);
+    return once_molecule_export(s.context, s.molecule, 0.5, path, &options);
 }
 
 #define WRITES(function, name, write)                                                              \
@@ -350,9 +350,9 @@ static int make_subject(void **state) {
         return -1;
     test_check(s.context, ovoid_molecule_create(s.context, xyzr, ATOMS, &s.molecule));
     test_check(s.context, ovoid_fit(s.context, s.molecule, &fitting, &s.model, NULL));
-    test_check(s.context, ovoid_molecule_mesh(s.context, s.molecule, 0.5, &meshing, &s.mesh));
-    test_check(s.context, ovoid_model_mesh(s.context, s.model, &meshing, &s.other));
-    test_check(s.context, ovoid_render(s.context, s.molecule, 0.5, NULL, &picture, &s.image));
+    test_check(s.context, once_molecule_mesh(s.context, s.molecule, 0.5, &meshing, &s.mesh));
+    test_check(s.context, once_model_mesh(s.context, s.model, &meshing, &s.other));
+    test_check(s.context, once_render(s.context, s.molecule, 0.5, NULL, &picture, &s.image));
     snprintf(s.model_file, sizeof s.model_file, "%s", scratch_path(s.place, "model.ovoid"));
     snprintf(s.molecule_file, sizeof s.molecule_file, "%s", scratch_path(s.place, "m.xyzr"));
     test_check(s.context, ovoid_model_write(s.context, s.model, s.model_file));

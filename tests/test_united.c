@@ -305,7 +305,7 @@ static void measure_fas2(ovoid_context *context, const double *xyzr, size_t heav
     options.distances = false;
     test_check(context, ovoid_molecule_create(context, xyzr, heavy, &molecule));
     test_check(context, ovoid_model_create(context, all, count, 0.5, 1.0, &model));
-    test_check(context, ovoid_measure(context, molecule, model, &options, measures));
+    test_check(context, once_measure(context, molecule, model, &options, measures));
     ovoid_molecule_destroy(&molecule);
     ovoid_model_destroy(&model);
 }

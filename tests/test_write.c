@@ -504,7 +504,7 @@ static ovoid_mesh *mesh_touching(size_t k) {
     options.spacing = touching[k].spacing;
     options.vertices = touching[k].vertices;
     test_check(context, ovoid_molecule_create(context, xyzr, 1, &molecule));
-    test_check(context, ovoid_molecule_mesh(context, molecule, 0.5, &options, &made));
+    test_check(context, once_molecule_mesh(context, molecule, 0.5, &options, &made));
     ovoid_molecule_destroy(&molecule);
     return made;
 }

@@ -1,5 +1,7 @@
 #include "base/base.h"
 
+#include "base/tenant.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -56,6 +58,7 @@ static void drop_error(ovoid_context *context) {
 void ovoid_context_destroy(ovoid_context **context) {
     if (!context || !*context || (*context)->calling)
         return;
+    ov_tenants_release(*context);
     if ((*context)->close_device)
         (*context)->close_device(*context);
     drop_error(*context);

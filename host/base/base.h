@@ -22,6 +22,7 @@ struct ovoid_context {
     unsigned calling;                      /* callbacks that run, one within the other */
     double began;                          /* the outermost work, in ov_seconds() */
     unsigned works;                        /* public functions at work, one within the other */
+    struct ov_tenant *tenants;             /* base/tenant.h */
     bool profile;                          /* devices begin with their launches counted */
     struct ov_device *device;              /* NULL until opened */
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */

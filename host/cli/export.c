@@ -241,11 +241,10 @@ static int run(export_job *job) {
         status = ovoid_context_open_device(job->context, job->device);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
-    if (job->source.model)
-        status = ovoid_model_export(job->context, job->source.model, job->output, options);
-    else
-        status = ovoid_molecule_export(job->context, job->source.molecule, job->numbers.decay,
-                                       job->output, options);
+    status = source_field(job->context, &job->source, job->numbers.decay, OVOID_DEFAULT_ISOVALUE);
+    if (status != OVOID_OK)
+        return cli_failure(job->context, status, CLI_INPUT);
+    status = ovoid_field_export(job->context, job->source.field, job->output, options);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     print_summary(job);

@@ -186,8 +186,8 @@ static int measure(fit_job *job, fit_level *level) {
     double begin = cli_seconds();
     job->measuring.isovalue = job->options.isovalue;
     ovoid_measures_init(&level->measures, sizeof level->measures);
-    ovoid_status status =
-        ovoid_measure(job->context, job->molecule, level->model, &job->measuring, &level->measures);
+    ovoid_status status = measures_compare(job->context, job->molecule, level->model,
+                                           &job->measuring, &level->measures);
     level->measured = status == OVOID_OK;
     if (status == OVOID_ERROR_EMPTY) {
         if (!job->quiet)

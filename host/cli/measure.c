@@ -25,6 +25,7 @@ typedef struct measure_job {
     ovoid_context *context;
     ovoid_molecule *molecule;
     ovoid_model *model;
+    ovoid_field *original, *sparse; /* of the two */
     double started;
 } measure_job;
 
@@ -233,13 +234,14 @@ static void print_before(const measure_job *job) {
 
 /* A value without a surface costs its row alone. */
 static ovoid_status measure_rows(measure_job *job) {
-    ovoid_status status = OVOID_OK;
-    for (size_t i = 0; i < job->row_count; i++) {
+    ovoid_status status =
+        measures_fields(job->context, job->molecule, job->model, &job->original, &job->sparse);
+    for (size_t i = 0; i < job->row_count && status == OVOID_OK; i++) {
         measure_row *row = &job->rows[i];
         job->options.isovalue = row->isovalue;
         ovoid_measures_init(&row->measures, sizeof row->measures);
         status =
-            ovoid_measure(job->context, job->molecule, job->model, &job->options, &row->measures);
+            ovoid_measure(job->context, job->original, job->sparse, &job->options, &row->measures);
         row->measured = status == OVOID_OK;
         if (status == OVOID_ERROR_EMPTY && job->row_count > 1) {
             row->error = strdup(ovoid_context_error(job->context));
@@ -247,14 +249,15 @@ static ovoid_status measure_rows(measure_job *job) {
                 return OVOID_ERROR_MEMORY;
             if (!job->quiet)
                 cli_warning("isovalue %.9g: %s", row->isovalue, row->error);
-        } else if (status != OVOID_OK) {
-            return status;
+            status = OVOID_OK;
         }
     }
+    if (status != OVOID_OK)
+        return status;
     for (size_t i = 0; i < job->row_count; i++)
         if (job->rows[i].measured)
             return OVOID_OK;
-    return status;
+    return OVOID_ERROR_EMPTY;
 }
 
 static void print_rows(const measure_job *job, FILE *out) {
@@ -383,6 +386,8 @@ int cli_measure(int argc, char **argv) {
         free(job.rows[i].error);
     free(job.rows);
     cli_profile_destroy(&job.profile);
+    ovoid_field_destroy(&job.original);
+    ovoid_field_destroy(&job.sparse);
     ovoid_model_destroy(&job.model);
     ovoid_molecule_destroy(&job.molecule);
     ovoid_context_destroy(&job.context);

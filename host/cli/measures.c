@@ -27,6 +27,26 @@ const char *measures_vertices_name(ovoid_vertex_rule vertices) {
     return "unknown";
 }
 
+ovoid_status measures_fields(ovoid_context *context, const ovoid_molecule *molecule,
+                             const ovoid_model *model, ovoid_field **original,
+                             ovoid_field **sparse) {
+    const ovoid_status status = ovoid_field_of_molecule(context, molecule, ovoid_model_decay(model),
+                                                        ovoid_model_isovalue(model), original);
+    return status == OVOID_OK ? ovoid_field_of_model(context, model, sparse) : status;
+}
+
+ovoid_status measures_compare(ovoid_context *context, const ovoid_molecule *molecule,
+                              const ovoid_model *model, const ovoid_measure_options *options,
+                              ovoid_measures *measures) {
+    ovoid_field *original = NULL, *sparse = NULL;
+    ovoid_status status = measures_fields(context, molecule, model, &original, &sparse);
+    if (status == OVOID_OK)
+        status = ovoid_measure(context, original, sparse, options, measures);
+    ovoid_field_destroy(&original);
+    ovoid_field_destroy(&sparse);
+    return status;
+}
+
 static void print_pair(FILE *stream, const char *name, const char *unit, ovoid_pair whole,
                        ovoid_pair outer) {
     fprintf(stream, "%-8s  %.6g %s, of the model %.6g %s: error %.3g %%", name, whole.original,

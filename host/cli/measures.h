@@ -12,15 +12,19 @@
 
 /* ---- inputs (source.c) ---------------------------------------------------------------------- */
 
-/* One of the two. */
+/* One of the two, and its field. */
 typedef struct source {
     ovoid_molecule *molecule;
     ovoid_model *model;
+    ovoid_field *field;
 } source;
 
 /* Reads a molecule or a model. The source starts as {0}. */
 ovoid_status source_read(ovoid_context *context, const char *path, const reading *how,
                          source *read);
+
+/* Makes its field; decay and isovalue are for a molecule. */
+ovoid_status source_field(ovoid_context *context, source *read, double decay, double isovalue);
 void source_destroy(source *read);
 
 /* The name of `input` without folder, .gz and extension, with another extension; to be freed. NULL
@@ -34,6 +38,18 @@ const char *source_name(const char *path);
 
 bool measures_parse_vertices(const char *text, ovoid_vertex_rule *vertices);
 const char *measures_vertices_name(ovoid_vertex_rule vertices);
+
+/* ---- work (measures.c) ---------------------------------------------------------------------- */
+
+/* The field of the molecule with the model's decay and isovalue, and the model's. */
+ovoid_status measures_fields(ovoid_context *context, const ovoid_molecule *molecule,
+                             const ovoid_model *model, ovoid_field **original,
+                             ovoid_field **sparse);
+
+/* Compares the two once. */
+ovoid_status measures_compare(ovoid_context *context, const ovoid_molecule *molecule,
+                              const ovoid_model *model, const ovoid_measure_options *options,
+                              ovoid_measures *measures);
 
 /* ---- results (measures.c) ------------------------------------------------------------------- */
 

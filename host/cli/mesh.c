@@ -34,6 +34,7 @@ enum { NUMBER_COUNT = sizeof numbers / sizeof *numbers };
 
 static void set_defaults(mesh_job *job) {
     ovoid_mesh_options_init(&job->options, sizeof job->options);
+    job->options.isovalue = OVOID_DEFAULT_ISOVALUE;
     job->decay = OVOID_DEFAULT_DECAY;
 }
 
@@ -224,10 +225,9 @@ static void measure_mesh(mesh_job *job) {
 static ovoid_status make_mesh(mesh_job *job) {
     const double begin = cli_seconds();
     ovoid_status status =
-        job->source.model
-            ? ovoid_model_mesh(job->context, job->source.model, &job->options, &job->mesh)
-            : ovoid_molecule_mesh(job->context, job->source.molecule, job->decay, &job->options,
-                                  &job->mesh);
+        source_field(job->context, &job->source, job->decay, job->options.isovalue);
+    if (status == OVOID_OK)
+        status = ovoid_field_mesh(job->context, job->source.field, &job->options, &job->mesh);
     job->mesh_seconds = cli_seconds() - begin;
     return status;
 }

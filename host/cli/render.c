@@ -21,6 +21,7 @@ typedef struct render_job {
     ovoid_context *context;
     ovoid_molecule *molecule;
     ovoid_model *model;
+    ovoid_field *original_field, *model_field;
     ovoid_image *image;
     double started;
 } render_job;
@@ -88,6 +89,7 @@ enum { VIEWS = sizeof view_names / sizeof *view_names };
 void cli_render_help(FILE *stream) {
     render_job defaults = {.decay = OVOID_DEFAULT_DECAY};
     ovoid_picture_options_init(&defaults.options, sizeof defaults.options);
+    defaults.options.isovalue = OVOID_DEFAULT_ISOVALUE;
     fprintf(
         stream,
         "Usage: ovoid render MOLECULE [MODEL] -o FILE.png [OPTION]...\n"
@@ -420,6 +422,16 @@ static ovoid_status read_inputs(render_job *job) {
     return status;
 }
 
+static ovoid_status make_fields(render_job *job) {
+    ovoid_status status = OVOID_OK;
+    if (job->molecule)
+        status = ovoid_field_of_molecule(job->context, job->molecule, job->decay,
+                                         job->options.isovalue, &job->original_field);
+    if (status == OVOID_OK && job->model)
+        status = ovoid_field_of_model(job->context, job->model, &job->model_field);
+    return status;
+}
+
 static void print_summary(const render_job *job) {
     cli_progress_erase();
     FILE *const stream = strcmp(job->output, "-") == 0 ? stderr : stdout;
@@ -463,8 +475,10 @@ static int run(render_job *job) {
         return cli_failure(job->context, status, CLI_INPUT);
     if ((status = ovoid_context_open_device(job->context, job->device)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
-    status = ovoid_render(job->context, job->molecule, job->decay, job->model, &job->options,
-                          &job->image);
+    status = make_fields(job);
+    if (status == OVOID_OK)
+        status = ovoid_render(job->context, job->original_field, job->model_field, &job->options,
+                              &job->image);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
     return write_picture(job);
@@ -474,11 +488,14 @@ int cli_render(int argc, char **argv) {
     render_job job = {.started = cli_seconds(), .decay = OVOID_DEFAULT_DECAY};
     int code;
     ovoid_picture_options_init(&job.options, sizeof job.options);
+    job.options.isovalue = OVOID_DEFAULT_ISOVALUE;
     if (parse(argc, argv, &job, &code)) {
         if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);
     }
     ovoid_image_destroy(&job.image);
+    ovoid_field_destroy(&job.original_field);
+    ovoid_field_destroy(&job.model_field);
     ovoid_model_destroy(&job.model);
     ovoid_molecule_destroy(&job.molecule);
     ovoid_context_destroy(&job.context);

@@ -9,7 +9,14 @@ ovoid_status source_read(ovoid_context *context, const char *path, const reading
                                        : reading_molecule(how, context, path, &read->molecule);
 }
 
+ovoid_status source_field(ovoid_context *context, source *read, double decay, double isovalue) {
+    return read->model
+               ? ovoid_field_of_model(context, read->model, &read->field)
+               : ovoid_field_of_molecule(context, read->molecule, decay, isovalue, &read->field);
+}
+
 void source_destroy(source *read) {
+    ovoid_field_destroy(&read->field);
     ovoid_molecule_destroy(&read->molecule);
     ovoid_model_destroy(&read->model);
 }

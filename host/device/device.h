@@ -42,6 +42,7 @@ typedef struct ov_device {
     cl_device_id id;
     cl_context context;
     cl_command_queue queue; /* in order */
+    bool borrowed;          /* the last three are the caller's */
     ov_shape shape;
     size_t max_group;              /* largest work-group */
     uint32_t team;                 /* work-items that share a term, -DOV_TEAM: 1 with one lane */
@@ -144,6 +145,12 @@ ovoid_status ov_buffer_read_later(ovoid_context *context, const ov_buffer *buffe
 /* Waits for the read, but not for what was enqueued after it; at once where there is none. */
 ovoid_status ov_later_end(ovoid_context *context, ov_later *later);
 
+/* For buffers of the caller's: OVOID_ERROR_ARGUMENT unless it is one of the opened device's context
+ * that holds so many bytes and, `written`, that kernels may write to. `name` is the argument's. */
+ovoid_status ov_memory_check(ovoid_context *context, cl_mem memory, size_t bytes, bool written,
+                             const char *name);
+/* Fills its first bytes with zeros; does not wait. */
+ovoid_status ov_memory_clear(ovoid_context *context, cl_mem memory, size_t bytes);
 /* Waits until everything enqueued has run. */
 ovoid_status ov_finish(ovoid_context *context);
 

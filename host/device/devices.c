@@ -130,6 +130,30 @@ static void prepare(void) {
     clGetPlatformIDs(0, NULL, &count);
 }
 
+ovoid_status ov_device_describe(ovoid_context *context, cl_device_id id, ov_device_entry *entry) {
+    ov_device_entry made = {.id = id, .info.size = sizeof made.info, .info.index = UINT32_MAX};
+    pthread_once(&prepared, prepare);
+    const char *call = "clGetDeviceInfo";
+    cl_int code =
+        clGetDeviceInfo(id, CL_DEVICE_PLATFORM, sizeof made.platform, &made.platform, NULL);
+    if (code == CL_SUCCESS)
+        code = describe(&made);
+    if (code == CL_SUCCESS) {
+        call = "clGetPlatformInfo";
+        code = platform_text(made.platform, CL_PLATFORM_NAME, made.info.platform,
+                             sizeof made.info.platform);
+    }
+    if (code != CL_SUCCESS)
+        return ov_cl_fail_on(context, code, call, NULL, NULL);
+    if (!pocl_usable && strcmp(made.info.platform, OV_POCL_PLATFORM) == 0)
+        return ov_fail(context, OVOID_ERROR_DEVICE, "%s", prepare_warning);
+    if (made.defect[0])
+        return ov_fail(context, OVOID_ERROR_DEVICE, "the device, %s, %s", made.info.name,
+                       made.defect);
+    *entry = made;
+    return OVOID_OK;
+}
+
 /* ---- the list ----------------------------------------------------------------------------- */
 
 typedef struct list {
@@ -200,6 +224,7 @@ ovoid_status ov_devices_list(ovoid_context *context, ov_device_entry **entries, 
     cl_platform_id *ids = NULL;
     cl_uint found = 0;
     list all = {0};
+    OV_TRY(ov_opencl_begin(context));
     pthread_once(&prepared, prepare);
     cl_int code = clGetPlatformIDs(0, NULL, &found);
     if (code == CL_PLATFORM_NOT_FOUND_KHR)

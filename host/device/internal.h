@@ -13,6 +13,23 @@
 ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call,
                            const char *kernel, const char *device);
 
+/* ---- the process -------------------------------------------------------------------------- */
+
+/* Whether this process was forked from one that had used OpenCL. Then no OpenCL call may be made,
+ * nor anything released. */
+bool ov_opencl_lost(void);
+
+/* Release these, where that may be done. */
+void ov_release_memory(cl_mem memory);
+void ov_release_kernel(cl_kernel kernel);
+void ov_release_program(cl_program program);
+
+/* OVOID_ERROR_DEVICE where that is so. */
+ovoid_status ov_opencl_check(ovoid_context *context);
+
+/* The same, before the first call of OpenCL: from now on this process uses it. */
+ovoid_status ov_opencl_begin(ovoid_context *context);
+
 /* ---- text --------------------------------------------------------------------------------- */
 
 /* A growing text, or bytes; {0} is an empty one. `text` is NULL or ends with a null byte. */
@@ -47,6 +64,19 @@ typedef struct ov_device_entry {
  * *entries is to be freed; *platforms counts the platforms that answered or failed. */
 ovoid_status ov_devices_list(ovoid_context *context, ov_device_entry **entries, size_t *count,
                              size_t *platforms);
+
+/* Describes a device that the caller has found; its index is UINT32_MAX. */
+ovoid_status ov_device_describe(ovoid_context *context, cl_device_id id, ov_device_entry *entry);
+
+/* What a caller hands over with a device. */
+typedef struct ov_handles {
+    cl_context context;
+    cl_command_queue queue;
+} ov_handles;
+
+/* Opens the device in the place of the one that was; handles NULL: with a queue of its own. */
+ovoid_status ov_device_open(ovoid_context *context, const ov_device_entry *entry,
+                            const ov_handles *handles);
 
 /* "cpu", "gpu", "accelerator", "other". */
 const char *ov_device_type_name(ovoid_device_type type);
@@ -103,6 +133,10 @@ void ov_pool_own(ov_pool *pool, cl_mem memory, size_t bytes, ov_buffer *buffer);
 /* Takes a buffer back, which is not to be used any more. The queue is in order: what still works on
  * it ends before whatever the next owner asks for. */
 void ov_pool_put(ov_buffer *buffer);
+
+/* ---- the caller's queue ------------------------------------------------------------------- */
+
+bool ov_queue_is_timed(cl_command_queue queue);
 
 /* ---- profile ------------------------------------------------------------------------------ */
 

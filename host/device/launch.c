@@ -38,7 +38,9 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "a kernel was launched before it was made");
     if (local > kernel->max_group)
         local = kernel->max_group;
-    ovoid_status status = check_launch(context, kernel, global, local, arg_count);
+    ovoid_status status = ov_opencl_check(context);
+    if (status == OVOID_OK)
+        status = check_launch(context, kernel, global, local, arg_count);
     if (status == OVOID_OK)
         status = ov_progress_ask(context);
     if (status != OVOID_OK)
@@ -78,6 +80,9 @@ static ovoid_status idle(ovoid_context *context) {
 ovoid_status ov_finish(ovoid_context *context) {
     if (!context->device)
         return OVOID_OK;
+    const ovoid_status status = ov_opencl_check(context);
+    if (status != OVOID_OK)
+        return status;
     cl_int code = clFinish(context->device->queue);
     return code == CL_SUCCESS ? idle(context) : ov_cl_fail(context, code, "clFinish", NULL);
 }
@@ -165,7 +170,7 @@ static ovoid_status check_range(ovoid_context *context, const ov_buffer *buffer,
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "%zu bytes at %zu are outside a buffer of %zu bytes", bytes, offset,
                        buffer->bytes);
-    return OVOID_OK;
+    return ov_opencl_check(context);
 }
 
 ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t offset,

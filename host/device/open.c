@@ -1,6 +1,7 @@
 #include "device/internal.h"
 
 #include "base/progress.h"
+#include "base/tenant.h"
 
 #include "shared.h"
 
@@ -245,15 +246,18 @@ static void set_groups(ov_device *device) {
 static void release(ov_device *device) {
     if (!device)
         return;
+    const bool lost = ov_opencl_lost();
     ov_programs_release(device);
     ov_pool_close(device->pool);
-    if (device->queue) {
+    if (device->queue && !lost)
         clFinish(device->queue);
-        ov_profile_release(device);
+    ov_profile_release(device);
+    if (device->queue && !lost)
         clReleaseCommandQueue(device->queue);
-    }
-    if (device->context)
+    if (device->context && !lost)
         clReleaseContext(device->context);
+    if (device->borrowed && !lost)
+        clReleaseDevice(device->id);
     free(device->staged);
     free(device);
 }
@@ -261,13 +265,47 @@ static void release(ov_device *device) {
 void ov_device_close(ovoid_context *context) {
     if (!context)
         return;
+    ov_tenants_leave(context);
     release(context->device);
     context->device = NULL;
     context->close_device = NULL;
 }
 
+/* A context and a queue of Ovoid's own. */
+static cl_int create_queue(ov_device *device, const char **call) {
+    const cl_context_properties properties[] = {CL_CONTEXT_PLATFORM,
+                                                (cl_context_properties)device->platform, 0};
+    cl_int code;
+    *call = "clCreateContext";
+    device->context = clCreateContext(properties, 1, &device->id, NULL, NULL, &code);
+    if (code == CL_SUCCESS) {
+        *call = "clCreateCommandQueue";
+        device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
+    }
+    return code;
+}
+
+/* The caller's. */
+static cl_int retain_queue(ov_device *device, const ov_handles *handles, const char **call) {
+    *call = "clRetainDevice";
+    cl_int code = clRetainDevice(device->id);
+    device->borrowed = code == CL_SUCCESS;
+    if (code == CL_SUCCESS) {
+        *call = "clRetainContext";
+        code = clRetainContext(handles->context);
+    }
+    if (code == CL_SUCCESS) {
+        device->context = handles->context;
+        *call = "clRetainCommandQueue";
+        code = clRetainCommandQueue(handles->queue);
+    }
+    if (code == CL_SUCCESS)
+        device->queue = handles->queue;
+    return code;
+}
+
 static ovoid_status make_device(ovoid_context *context, const ov_device_entry *entry,
-                                ov_device **made) {
+                                const ov_handles *handles, ov_device **made) {
     ovoid_status status = OVOID_OK;
     const char *name = entry->info.name;
     ov_device *device = ov_alloc(context, 1, sizeof *device, "a device");
@@ -279,16 +317,8 @@ static ovoid_status make_device(ovoid_context *context, const ov_device_entry *e
     const char *call = "clGetDeviceInfo";
     cl_int code = clGetDeviceInfo(device->id, CL_DEVICE_MAX_WORK_GROUP_SIZE,
                                   sizeof device->max_group, &device->max_group, NULL);
-    if (code == CL_SUCCESS) {
-        const cl_context_properties properties[] = {CL_CONTEXT_PLATFORM,
-                                                    (cl_context_properties)entry->platform, 0};
-        call = "clCreateContext";
-        device->context = clCreateContext(properties, 1, &device->id, NULL, NULL, &code);
-    }
-    if (code == CL_SUCCESS) {
-        call = "clCreateCommandQueue";
-        device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
-    }
+    if (code == CL_SUCCESS)
+        code = handles ? retain_queue(device, handles, &call) : create_queue(device, &call);
     if (code != CL_SUCCESS) {
         status = ov_cl_fail_on(context, code, call, NULL, name);
         goto cleanup;
@@ -308,21 +338,29 @@ cleanup:
     return status;
 }
 
+ovoid_status ov_device_open(ovoid_context *context, const ov_device_entry *entry,
+                            const ov_handles *handles) {
+    ov_device *device = NULL;
+    const ovoid_status status = make_device(context, entry, handles, &device);
+    if (status != OVOID_OK)
+        return status;
+    ov_device_close(context);
+    context->device = device;
+    context->close_device = ov_device_close;
+    return OVOID_OK;
+}
+
 ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector) {
     ovoid_status status = OVOID_OK;
     ov_device_entry *entries = NULL;
     const ov_device_entry *entry = NULL;
-    ov_device *device = NULL;
     size_t count = 0, platforms = 0;
     OV_NEED(context, context);
     ov_progress_begin(context, "open");
     OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_devices_list(context, &entries, &count, &platforms));
     OV_TRY(choose(context, selector, entries, count, platforms, &entry));
-    OV_TRY(make_device(context, entry, &device));
-    ov_device_close(context);
-    context->device = device;
-    context->close_device = ov_device_close;
+    OV_TRY(ov_device_open(context, entry, NULL));
 cleanup:
     free(entries);
     ov_progress_end(context);
@@ -353,5 +391,5 @@ ovoid_status ov_device_get(ovoid_context *context, ov_device **device) {
             return status;
     }
     *device = context->device;
-    return OVOID_OK;
+    return ov_opencl_check(context);
 }

@@ -60,7 +60,7 @@ static kept_buffer take_out(ov_pool *pool, size_t k) {
 bool ov_pool_empty(ov_pool *pool) {
     const bool some = pool->count > 0;
     while (pool->count > 0)
-        clReleaseMemObject(take_out(pool, pool->count - 1).memory);
+        ov_release_memory(take_out(pool, pool->count - 1).memory);
     return some;
 }
 
@@ -105,10 +105,10 @@ void ov_pool_own(ov_pool *pool, cl_mem memory, size_t bytes, ov_buffer *buffer) 
 void ov_pool_put(ov_buffer *buffer) {
     ov_pool *const pool = buffer->pool;
     if (!pool->open || buffer->bytes > pool->most) {
-        clReleaseMemObject(buffer->memory);
+        ov_release_memory(buffer->memory);
     } else {
         while (pool->count == KEPT_MOST || pool->bytes > pool->most - buffer->bytes)
-            clReleaseMemObject(take_out(pool, 0).memory);
+            ov_release_memory(take_out(pool, 0).memory);
         pool->kept[pool->count++] = (kept_buffer){buffer->memory, buffer->bytes};
         pool->bytes += buffer->bytes;
     }

@@ -41,6 +41,9 @@ ovoid_status ov_profile_drain(ovoid_context *context, ov_device *device) {
     ov_profile *profile = device->profile;
     if (!profile || profile->pending_count == 0)
         return OVOID_OK;
+    const ovoid_status status = ov_opencl_check(context);
+    if (status != OVOID_OK)
+        return status;
     /* The queue is in order: the last launch is the last to end. */
     const pending last = profile->pending[profile->pending_count - 1];
     cl_int code = clWaitForEvents(1, &last.event);
@@ -90,7 +93,7 @@ void ov_profile_release(ov_device *device) {
     ov_profile *profile = device->profile;
     if (!profile)
         return;
-    for (size_t i = 0; i < profile->pending_count; i++)
+    for (size_t i = 0; i < profile->pending_count && !ov_opencl_lost(); i++)
         clReleaseEvent(profile->pending[i].event);
     free(profile->kernels);
     free(profile);
@@ -103,6 +106,11 @@ static ovoid_status replace_queue(ovoid_context *context, ov_device *device, boo
                                   bool *refused) {
     const char *call = "clFinish";
     cl_int code = clFinish(device->queue);
+    if (device->borrowed) { /* the caller's is as it is */
+        *refused = timed && !ov_queue_is_timed(device->queue);
+        return code == CL_SUCCESS ? OVOID_OK
+                                  : ov_cl_fail_on(context, code, call, NULL, device->info.name);
+    }
     if (code == CL_SUCCESS) {
         call = "clCreateCommandQueue";
         cl_command_queue queue = clCreateCommandQueue(device->context, device->id,
@@ -154,6 +162,8 @@ ovoid_status ovoid_context_profile(ovoid_context *context, bool on) {
     ovoid_status status = OVOID_OK;
     OV_NEED(context, context);
     if (context->device)
+        status = ov_opencl_check(context);
+    if (context->device && status == OVOID_OK)
         status = on ? ov_profile_start(context, context->device) : stop(context, context->device);
     if (status == OVOID_OK)
         context->profile = on;

@@ -297,13 +297,13 @@ void ov_programs_release(ov_device *device) {
     while (device->made) {
         struct ov_made *made = device->made;
         device->made = made->next;
-        clReleaseKernel(made->kernel.handle);
+        ov_release_kernel(made->kernel.handle);
         free(made);
     }
     while (device->programs) {
         struct ov_program *program = device->programs;
         device->programs = program->next;
-        clReleaseProgram(program->handle);
+        ov_release_program(program->handle);
         free(program);
     }
 }
@@ -389,6 +389,6 @@ void ov_kernel_destroy(ov_kernel *kernel) {
     if (!kernel)
         return;
     if (kernel->handle)
-        clReleaseKernel(kernel->handle);
+        ov_release_kernel(kernel->handle);
     *kernel = (ov_kernel){0};
 }

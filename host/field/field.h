@@ -104,6 +104,12 @@ void ov_pack_box(const float *pack, float box[6]);
 /* Index of cell (x, y, z), `bits` bits each (1 to 21), along the Hilbert curve. */
 uint64_t ov_hilbert_index(uint32_t x, uint32_t y, uint32_t z, unsigned bits);
 
+/* order[k] = index of the k-th point along the curve, of cells of about `resolution` angstrom; xyz:
+ * 3
+ * * count coordinates. */
+ovoid_status ov_curve_order(ovoid_context *context, const double *xyz, size_t count,
+                            double resolution, uint32_t *order);
+
 /* order[k] = index of the k-th smallest key; equal keys keep their order. */
 ovoid_status ov_sort_keys(ovoid_context *context, const uint64_t *keys, size_t count,
                           uint32_t *order);
@@ -152,10 +158,10 @@ typedef struct ov_lists {
     ov_buffer pack_start; /* packs + 1 */
     ov_buffer pack_item;  /* terms of each pack, ascending */
     /* Scratch, kept for the next time (kernels/lists.cl). */
-    ov_buffer tally, chain, next, entry_group, entry_bits, place, group_term, group_bits;
-    uint32_t *scan;
-    size_t scan_capacity;
-    ov_kernel packs_of_terms, lists_of_terms, entries_of_groups, lists_of_packs;
+    ov_buffer tally, totals, chain, next, entry_group, entry_bits, place, group_term, group_bits;
+    ov_kernel packs_of_terms, scan_lists, hand_out_entries, lists_of_packs;
+    ov_later later; /* the read of what they come to, between begin and end */
+    cl_uint told[5];
 } ov_lists;
 
 /* Pairs terms with the packs that they reach, boxes grown by skin and the term's own (angstrom).
@@ -163,6 +169,14 @@ typedef struct ov_lists {
  */
 ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_points *points,
                             const ov_terms *terms, double skin);
+/* As ov_lists_build() without waiting, in the memory that the lists have got: ov_lists_end() is to
+ * follow, after failures too, and says whether that was enough. What is launched in between finds
+ * empty lists otherwise, and is to be done again after ov_lists_build(). */
+ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                            const ov_terms *terms, double skin);
+ovoid_status ov_lists_end(ovoid_context *context, ov_lists *lists, bool *whole);
+/* Whether lists were built in the memory before: ov_lists_begin() has something to begin with. */
+bool ov_lists_built(const ov_lists *lists);
 void ov_lists_destroy(ov_lists *lists);
 
 /* ---- operations --------------------------------------------------------------------------- */

@@ -13,8 +13,9 @@ typedef struct plan {
     cl_uint groups;  /* of packs; 0 where their lists are not wanted */
     cl_uint block;   /* terms that share a bin */
     size_t bins;     /* of all groups */
-    size_t counters; /* chunks, terms, bins, groups */
-    size_t group;    /* work-items of a work-group */
+    size_t counters; /* chunks, bins, groups, terms */
+    size_t group;    /* work-items of a work-group, */
+    size_t scan;     /* and of that which makes starts of counts */
 } plan;
 
 static plan make_plan(const ov_device *device, const ov_lists *lists, const ov_points *points,
@@ -23,8 +24,9 @@ static plan make_plan(const ov_device *device, const ov_lists *lists, const ov_p
     p.groups = lists->terms_only ? 0 : (p.packs + OV_GROUP - 1) / OV_GROUP;
     p.block = p.terms / OV_BINS + 1;
     p.bins = (size_t)p.groups * OV_BINS;
-    p.counters = 1 + (size_t)p.terms + p.bins + p.groups;
+    p.counters = 1 + p.bins + p.groups + p.terms;
     p.group = ov_item_group(device);
+    p.scan = device->shape.lanes == 1 ? 1 : OV_SCAN_GROUP;
     return p;
 }
 
@@ -32,8 +34,8 @@ static ovoid_status prepare(ovoid_context *context, ov_lists *lists) {
     ovoid_status status = OVOID_OK;
     if (lists->packs_of_terms.handle)
         return OVOID_OK;
-    OV_TRY(ov_kernel_create(context, "lists", "lists_of_terms", &lists->lists_of_terms));
-    OV_TRY(ov_kernel_create(context, "lists", "entries_of_groups", &lists->entries_of_groups));
+    OV_TRY(ov_kernel_create(context, "lists", "scan_lists", &lists->scan_lists));
+    OV_TRY(ov_kernel_create(context, "lists", "hand_out_entries", &lists->hand_out_entries));
     OV_TRY(ov_kernel_create(context, "lists", "lists_of_packs", &lists->lists_of_packs));
     OV_TRY(ov_kernel_create(context, "lists", "packs_of_terms", &lists->packs_of_terms));
 cleanup:
@@ -61,113 +63,143 @@ static size_t chunks_held(const ov_lists *lists) {
     return chunks < UINT32_MAX ? chunks : UINT32_MAX;
 }
 
-/* One walk of all terms, and its tally in lists->scan. */
-static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_points *points,
-                         const ov_terms *terms, double skin, const plan *p) {
+/* What a walk comes to: chunks taken, entries, pairs as low and high half, and whether all lists
+ * fitted. */
+enum { CHUNKS, ENTRIES, ITEMS, ITEMS_HIGH, FITS, TOTALS };
+
+/* Zeros at the beginning alone: who counts leaves them behind. */
+static ovoid_status reserve_tally(ovoid_context *context, ov_lists *lists, const plan *p) {
     ovoid_status status = OVOID_OK;
-    const cl_uint room = (cl_uint)chunks_held(lists);
+    const size_t bytes = p->counters * sizeof(cl_uint);
+    uint32_t *zero = NULL;
+    if (lists->tally.memory && bytes <= lists->tally.bytes)
+        return OVOID_OK;
+    OV_TRY(ov_buffer_reserve(context, &lists->tally, bytes, "counts of lists"));
+    zero = ov_alloc(context, lists->tally.bytes, 1, "counts of lists");
+    if (!zero)
+        status = OVOID_ERROR_MEMORY;
+    else
+        status = ov_buffer_write(context, &lists->tally, 0, zero, lists->tally.bytes);
+cleanup:
+    free(zero);
+    if (status != OVOID_OK)
+        ov_buffer_destroy(&lists->tally); /* it may hold anything */
+    return status;
+}
+
+/* One walk of all terms, and where what it counted begins. room: for chunks, entries and pairs. */
+static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                         const ov_terms *terms, double skin, const plan *p, cl_uint4 room) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint chunks = room.s[CHUNKS];
     const cl_float grow = (cl_float)(skin + (double)points->rounding);
-    memset(lists->scan, 0, p->counters * sizeof *lists->scan);
-    OV_TRY(
-        ov_buffer_write(context, &lists->tally, 0, lists->scan, p->counters * sizeof *lists->scan));
+    const cl_mem place = lists->terms_only ? NULL : lists->place.memory; /* null in the kernel */
+    const cl_mem start = lists->packs_only ? NULL : lists->term_start.memory;
+    OV_TRY(reserve_tally(context, lists, p));
     OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, p->terms, p->group, OV_ARG(p->terms),
                      OV_ARG(terms->device.memory), OV_ARG(points->tree),
                      OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(p->groups),
-                     OV_ARG(p->block), OV_ARG(room), OV_ARG(lists->tally.memory),
+                     OV_ARG(p->block), OV_ARG(chunks), OV_ARG(lists->tally.memory),
                      OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
                      OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory)));
+    OV_TRY(OV_LAUNCH(context, &lists->scan_lists, p->scan, p->scan, OV_ARG(p->terms),
+                     OV_ARG(p->groups), OV_ARG(room), OV_ARG(lists->tally.memory), OV_ARG(place),
+                     OV_ARG(start), OV_ARG(lists->totals.memory)));
+cleanup:
+    if (status != OVOID_OK)
+        ov_buffer_destroy(&lists->tally);
+    return status;
+}
+
+/* A walk with room for as many chunks as are held, and for whatever entries and pairs there are. */
+static ovoid_status count(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                          const ov_terms *terms, double skin, const plan *p,
+                          cl_uint totals[TOTALS]) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint4 room = {{(cl_uint)chunks_held(lists), UINT32_MAX, UINT32_MAX, 0}};
+    OV_TRY(walk(context, lists, points, terms, skin, p, room));
+    OV_TRY(ov_buffer_read(context, &lists->totals, 0, totals, TOTALS * sizeof *totals));
+cleanup:
+    return status;
+}
+
+static ovoid_status reserve_starts(ovoid_context *context, ov_lists *lists, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    const size_t size = sizeof(cl_uint);
+    OV_TRY(ov_buffer_reserve(context, &lists->totals, TOTALS * size, "counts of lists"));
     OV_TRY(
-        ov_buffer_read(context, &lists->tally, 0, lists->scan, p->counters * sizeof *lists->scan));
+        ov_buffer_reserve(context, &lists->chain, p->terms * sizeof(cl_uint2), "chunks of lists"));
+    if (!lists->terms_only)
+        OV_TRY(ov_buffer_reserve(context, &lists->place, (p->bins + p->groups) * size,
+                                 "starts of lists"));
+    if (!lists->packs_only)
+        OV_TRY(ov_buffer_reserve(context, &lists->term_start, (p->terms + (size_t)1) * size,
+                                 "starts of lists"));
+    if (!lists->next.memory)
+        OV_TRY(reserve_chunks(context, lists, (size_t)p->terms * CHUNKS_PER_TERM));
 cleanup:
     return status;
 }
 
 /* Finds the entries of all terms. Where their chunks do not suffice, once more with enough. */
 static ovoid_status find_entries(ovoid_context *context, ov_lists *lists, const ov_points *points,
-                                 const ov_terms *terms, double skin, const plan *p) {
+                                 const ov_terms *terms, double skin, const plan *p,
+                                 cl_uint totals[TOTALS]) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(ov_grow(context, &lists->scan, &lists->scan_capacity, p->counters + 1,
-                   sizeof *lists->scan, "lists"));
-    OV_TRY(ov_buffer_reserve(context, &lists->tally, p->counters * sizeof *lists->scan,
-                             "counts of lists"));
-    OV_TRY(
-        ov_buffer_reserve(context, &lists->chain, p->terms * sizeof(cl_uint2), "chunks of lists"));
-    if (!lists->next.memory)
-        OV_TRY(reserve_chunks(context, lists, (size_t)p->terms * CHUNKS_PER_TERM));
-    OV_TRY(walk(context, lists, points, terms, skin, p));
-    if (lists->scan[0] > chunks_held(lists)) {
-        OV_TRY(reserve_chunks(context, lists, lists->scan[0]));
-        OV_TRY(walk(context, lists, points, terms, skin, p));
+    OV_TRY(reserve_starts(context, lists, p));
+    OV_TRY(count(context, lists, points, terms, skin, p, totals));
+    if (totals[CHUNKS] > chunks_held(lists)) {
+        OV_TRY(reserve_chunks(context, lists, totals[CHUNKS]));
+        OV_TRY(count(context, lists, points, terms, skin, p, totals));
     }
-cleanup:
-    return status;
-}
-
-/* Turns counts into starts; their sum. */
-static uint64_t turn_to_starts(uint32_t *count, size_t size) {
-    uint64_t sum = 0;
-    for (size_t k = 0; k < size; ++k) {
-        const uint32_t own = count[k];
-        count[k] = (uint32_t)sum;
-        sum += own;
-    }
-    return sum;
-}
-
-/* Counts the pairs of all terms. */
-static ovoid_status count_items(ovoid_context *context, ov_lists *lists, const plan *p) {
-    uint64_t items = 0;
-    for (size_t i = 0; i < p->terms; ++i)
-        items += lists->scan[1 + i];
-    if (items > UINT32_MAX)
+    if (totals[ITEMS_HIGH] > 0)
         return ov_fail(context, OVOID_ERROR_LIMIT,
                        "more than 2^32 pairs of ellipsoids and packs of points; use a larger "
                        "spacing");
-    lists->items = (size_t)items;
-    return OVOID_OK;
-}
-
-static ovoid_status make_pack_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
-    ovoid_status status = OVOID_OK;
-    uint32_t *const bins = lists->scan + 1 + p->terms, *const pairs = bins + p->bins;
-    const size_t entries = (size_t)turn_to_starts(bins, p->bins); /* no more than pairs */
-    turn_to_starts(pairs, p->groups);
-    OV_TRY(ov_buffer_put(context, &lists->place, bins, (p->bins + p->groups) * sizeof *bins,
-                         "starts of lists"));
-    OV_TRY(ov_buffer_reserve(context, &lists->group_term, entries * sizeof(cl_uint),
-                             "groups of packs"));
-    OV_TRY(ov_buffer_reserve(context, &lists->group_bits, entries * sizeof(cl_ushort),
-                             "groups of packs"));
-    OV_TRY(ov_buffer_reserve(context, &lists->pack_start, (p->packs + (size_t)1) * sizeof *bins,
-                             "starts of lists"));
-    OV_TRY(ov_buffer_reserve(context, &lists->pack_item, lists->items * sizeof(cl_uint),
-                             "ellipsoids of packs"));
-    OV_TRY(OV_LAUNCH(context, &lists->entries_of_groups, p->terms, p->group, OV_ARG(p->terms),
-                     OV_ARG(p->block), OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
-                     OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory),
-                     OV_ARG(lists->place.memory), OV_ARG(lists->group_term.memory),
-                     OV_ARG(lists->group_bits.memory)));
-    OV_TRY(OV_LAUNCH(context, &lists->lists_of_packs, p->groups, p->group, OV_ARG(p->groups),
-                     OV_ARG(p->packs), OV_ARG(lists->place.memory),
-                     OV_ARG(lists->group_term.memory), OV_ARG(lists->group_bits.memory),
-                     OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory)));
+    lists->items = totals[ITEMS];
 cleanup:
     return status;
 }
 
-static ovoid_status make_term_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
+static ovoid_status reserve_items(ovoid_context *context, ov_lists *lists, const plan *p,
+                                  size_t entries) {
     ovoid_status status = OVOID_OK;
-    uint32_t *const start = lists->scan + 1;
-    turn_to_starts(start, p->terms);
-    start[p->terms] = (uint32_t)lists->items; /* over a bin that has been uploaded */
-    OV_TRY(ov_buffer_put(context, &lists->term_start, start, (p->terms + (size_t)1) * sizeof *start,
-                         "starts of lists"));
-    OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * sizeof(cl_uint),
-                             "packs of ellipsoids"));
-    OV_TRY(OV_LAUNCH(context, &lists->lists_of_terms, p->terms, p->group, OV_ARG(p->terms),
-                     OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
+    const size_t size = sizeof(cl_uint);
+    if (!lists->packs_only)
+        OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * size,
+                                 "packs of ellipsoids"));
+    if (lists->terms_only)
+        return OVOID_OK;
+    OV_TRY(ov_buffer_reserve(context, &lists->group_term, entries * size, "groups of packs"));
+    OV_TRY(ov_buffer_reserve(context, &lists->group_bits, entries * sizeof(cl_ushort),
+                             "groups of packs"));
+    OV_TRY(ov_buffer_reserve(context, &lists->pack_start, (p->packs + (size_t)1) * size,
+                             "starts of lists"));
+    OV_TRY(
+        ov_buffer_reserve(context, &lists->pack_item, lists->items * size, "ellipsoids of packs"));
+cleanup:
+    return status;
+}
+
+/* Makes the lists that are wanted from the entries. */
+static ovoid_status make_lists(ovoid_context *context, ov_lists *lists, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    const bool terms = !lists->packs_only, packs = !lists->terms_only;
+    const cl_mem start = terms ? lists->term_start.memory : NULL;
+    const cl_mem item = terms ? lists->term_item.memory : NULL;
+    const cl_mem place = packs ? lists->place.memory : NULL;
+    const cl_mem group_term = packs ? lists->group_term.memory : NULL;
+    const cl_mem group_bits = packs ? lists->group_bits.memory : NULL;
+    OV_TRY(OV_LAUNCH(context, &lists->hand_out_entries, p->terms, p->group, OV_ARG(p->terms),
+                     OV_ARG(p->block), OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
                      OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory),
-                     OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory)));
+                     OV_ARG(start), OV_ARG(item), OV_ARG(place), OV_ARG(group_term),
+                     OV_ARG(group_bits), OV_ARG(lists->totals.memory)));
+    if (packs)
+        OV_TRY(OV_LAUNCH(context, &lists->lists_of_packs, p->groups, p->group, OV_ARG(p->groups),
+                         OV_ARG(p->packs), OV_ARG(lists->place.memory),
+                         OV_ARG(lists->group_term.memory), OV_ARG(lists->group_bits.memory),
+                         OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory)));
 cleanup:
     return status;
 }
@@ -176,18 +208,67 @@ ovoid_status ov_lists_build(ovoid_context *context, ov_lists *lists, const ov_po
                             const ov_terms *terms, double skin) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
+    cl_uint totals[TOTALS] = {0};
     OV_TRY(ov_device_get(context, &device));
     const plan p = make_plan(device, lists, points, terms);
     OV_TRY(prepare(context, lists));
     lists->terms = terms->count;
     lists->packs = points->packs;
-    OV_TRY(find_entries(context, lists, points, terms, skin, &p));
-    OV_TRY(count_items(context, lists, &p));
-    if (!lists->terms_only)
-        OV_TRY(make_pack_lists(context, lists, &p));
-    if (!lists->packs_only)
-        OV_TRY(make_term_lists(context, lists, &p));
+    OV_TRY(find_entries(context, lists, points, terms, skin, &p, totals));
+    OV_TRY(reserve_items(context, lists, &p, totals[ENTRIES]));
+    OV_TRY(make_lists(context, lists, &p));
 cleanup:
+    return status;
+}
+
+/* ---- without waiting ------------------------------------------------------------------------ */
+
+bool ov_lists_built(const ov_lists *lists) {
+    return lists->next.memory && (lists->terms_only || lists->pack_item.memory) &&
+           (lists->packs_only || lists->term_item.memory);
+}
+
+/* Entries and pairs that there is room for. */
+static cl_uint4 rooms_of(const ov_lists *lists) {
+    size_t entries = UINT32_MAX, items = UINT32_MAX;
+    if (!lists->terms_only) {
+        const size_t bits = lists->group_bits.bytes / sizeof(cl_ushort);
+        entries = lists->group_term.bytes / sizeof(cl_uint);
+        entries = bits < entries ? bits : entries;
+        items = lists->pack_item.bytes / sizeof(cl_uint);
+    }
+    if (!lists->packs_only && lists->term_item.bytes / sizeof(cl_uint) < items)
+        items = lists->term_item.bytes / sizeof(cl_uint);
+    entries = entries < UINT32_MAX ? entries : UINT32_MAX;
+    items = items < UINT32_MAX ? items : UINT32_MAX;
+    return (cl_uint4){{(cl_uint)chunks_held(lists), (cl_uint)entries, (cl_uint)items, 0}};
+}
+
+ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                            const ov_terms *terms, double skin) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
+    OV_TRY(ov_device_get(context, &device));
+    const plan p = make_plan(device, lists, points, terms);
+    OV_TRY(prepare(context, lists));
+    lists->terms = terms->count;
+    lists->packs = points->packs;
+    OV_TRY(reserve_starts(context, lists, &p));
+    if (!lists->terms_only)
+        OV_TRY(ov_buffer_reserve(context, &lists->pack_start,
+                                 (p.packs + (size_t)1) * sizeof(cl_uint), "starts of lists"));
+    OV_TRY(walk(context, lists, points, terms, skin, &p, rooms_of(lists)));
+    OV_TRY(ov_buffer_read_later(context, &lists->totals, 0, lists->told, sizeof lists->told,
+                                &lists->later));
+    OV_TRY(make_lists(context, lists, &p));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_lists_end(ovoid_context *context, ov_lists *lists, bool *whole) {
+    const ovoid_status status = ov_later_end(context, &lists->later);
+    *whole = status == OVOID_OK && lists->told[FITS];
+    lists->items = *whole ? lists->told[ITEMS] : 0;
     return status;
 }
 
@@ -196,13 +277,13 @@ void ov_lists_destroy(ov_lists *lists) {
         &lists->term_start, &lists->term_item, &lists->pack_start, &lists->pack_item,
         &lists->tally,      &lists->chain,     &lists->next,       &lists->entry_group,
         &lists->entry_bits, &lists->place,     &lists->group_term, &lists->group_bits,
+        &lists->totals,
     };
-    ov_kernel *const kernels[] = {&lists->packs_of_terms, &lists->lists_of_terms,
-                                  &lists->entries_of_groups, &lists->lists_of_packs};
+    ov_kernel *const kernels[] = {&lists->packs_of_terms, &lists->scan_lists,
+                                  &lists->hand_out_entries, &lists->lists_of_packs};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
         ov_kernel_destroy(kernels[k]);
-    free(lists->scan);
     memset(lists, 0, sizeof *lists);
 }

@@ -121,8 +121,8 @@ static unsigned curve_bits(const double box[BOX], double resolution, double *cel
     return bits;
 }
 
-static ovoid_status order_points(ovoid_context *context, const double *xyz, size_t count,
-                                 double resolution, uint32_t *order) {
+ovoid_status ov_curve_order(ovoid_context *context, const double *xyz, size_t count,
+                            double resolution, uint32_t *order) {
     uint64_t *const keys = ov_alloc(context, count, sizeof *keys, "curve positions");
     if (!keys)
         return OVOID_ERROR_MEMORY;
@@ -314,7 +314,7 @@ ovoid_status ov_points_create(ovoid_context *context, const double *xyz, size_t 
         return OVOID_ERROR_MEMORY;
     const cutter c = {
         .xyz = xyz, .curve = curve, .count = count, .longest = longest_side(resolution)};
-    OV_TRY(order_points(context, xyz, count, resolution, curve));
+    OV_TRY(ov_curve_order(context, xyz, count, resolution, curve));
     OV_TRY(ov_progress_ask(context));
     OV_TRY(make_packs(context, &c, &made));
 cleanup:

@@ -2,6 +2,7 @@
 
 #include "base/progress.h"
 #include "base/sized.h"
+#include "base/tenant.h"
 #include "fit/adaptive/adaptive.h"
 #include "fit/l1/l1.h"
 #include "fit/motion.h"
@@ -20,18 +21,25 @@
 #define OWNER_REACH 15.0
 
 struct ovoid_fitter {
-    ovoid_context *context;
+    ov_tenant tenant;
+    ovoid_context *context; /* of the tenant, while that has one */
     bool once;
     double *xyzr;
     size_t atoms;
     ovoid_fit_options surface; /* what defines it; method and goal are those of each fit */
-    ov_adaptive *adaptive;     /* NULL until it is needed */
+    ov_adaptive *adaptive;     /* of the opened device; NULL until it is needed */
     ov_l1_band *band;          /* of method l1, likewise */
     ov_found start;            /* what method adaptive begins with; count 0: the atoms */
     ov_found last;             /* what it came to after that; count 0: nothing */
 };
 
 /* ---- the object ------------------------------------------------------------------------------ */
+
+static void leave_device(ov_tenant *tenant) {
+    ovoid_fitter *const fitter = (ovoid_fitter *)tenant; /* its first member */
+    ov_adaptive_destroy(&fitter->adaptive);
+    ov_l1_band_destroy(&fitter->band);
+}
 
 ovoid_status ov_fitter_create(ovoid_context *context, const ovoid_molecule *molecule,
                               const ovoid_fit_options *options, bool once, ovoid_fitter **fitter) {
@@ -48,6 +56,7 @@ ovoid_status ov_fitter_create(ovoid_context *context, const ovoid_molecule *mole
     if (!made)
         return OVOID_ERROR_MEMORY;
     *made = (ovoid_fitter){.context = context, .once = once, .atoms = atoms, .surface = surface};
+    ov_tenant_join(context, &made->tenant, leave_device);
     made->xyzr = ov_alloc(context, 4 * atoms, sizeof *made->xyzr, "atoms");
     if (!made->xyzr) {
         status = OVOID_ERROR_MEMORY;
@@ -73,19 +82,12 @@ ovoid_status ovoid_fitter_create(ovoid_context *context, const ovoid_molecule *m
 void ovoid_fitter_destroy(ovoid_fitter **fitter) {
     if (!fitter || !*fitter)
         return;
-    ov_adaptive_destroy(&(*fitter)->adaptive);
-    ov_l1_band_destroy(&(*fitter)->band);
+    ov_tenant_part(&(*fitter)->tenant);
     ov_found_destroy(&(*fitter)->start);
     ov_found_destroy(&(*fitter)->last);
     free((*fitter)->xyzr);
     free(*fitter);
     *fitter = NULL;
-}
-
-static ovoid_status check_context(ovoid_context *context, const ovoid_fitter *fitter) {
-    return context == fitter->context
-               ? OVOID_OK
-               : ov_fail(context, OVOID_ERROR_ARGUMENT, "this fitter belongs to another context");
 }
 
 /* ---- fitting --------------------------------------------------------------------------------- */
@@ -235,7 +237,7 @@ ovoid_status ovoid_fitter_reach(ovoid_context *context, ovoid_fitter *fitter,
     ovoid_fit_result_init(&done, sizeof done);
     ov_progress_begin(context, "sample");
     context->now.ellipsoids = fitter->atoms;
-    OV_TRY(check_context(context, fitter));
+    OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
     OV_TRY(OV_SIZED_TAKE(context, ovoid_fit_options, options, &wanted));
     OV_TRY(ov_sized_check(context, "ovoid_fit_result", result));
     status = reach(fitter, &wanted, &made, &done);
@@ -329,7 +331,7 @@ ovoid_status ovoid_fitter_start_from(ovoid_context *context, ovoid_fitter *fitte
     ov_found found = {0};
     OV_NEED(context, context);
     OV_NEED(context, fitter);
-    OV_TRY(check_context(context, fitter));
+    OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
     if (model) {
         OV_TRY(check_start(fitter, model));
         OV_TRY(take_model(fitter, model, &found));
@@ -374,7 +376,7 @@ ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, con
     OV_NEED(context, context);
     OV_NEED(context, fitter);
     OV_NEED(context, xyz);
-    OV_TRY(check_context(context, fitter));
+    OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
     OV_TRY(check_coordinates(fitter, xyz));
     after = ov_alloc(context, 4 * fitter->atoms, sizeof *after, "atoms");
     if (!after)

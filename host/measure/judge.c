@@ -1,7 +1,6 @@
 #include "measure/judge.h"
-#include "measure/distance.h"
-#include "mesh/march.h"
 #include "model/factor.h"
+#include "neighbours/neighbours.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,8 +17,9 @@
  * *mesh is NULL where there is no surface. */
 static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
                                 ovoid_mesh **mesh, ov_content *content) {
-    const ovoid_status status = ov_mesh_bodies_light(judge->context, bodies, count, &judge->meshing,
-                                                     judge->origin, &judge->watch, mesh);
+    const ovoid_status status =
+        ov_mesh_bodies_light(judge->context, judge->marcher, bodies, count, &judge->meshing,
+                             judge->origin, &judge->watch, mesh);
     if (status == OVOID_OK) {
         if (content)
             *content = ov_mesh_smooth(*mesh, false);
@@ -51,28 +51,44 @@ static bool has_outer(const ovoid_mesh *mesh) {
     return false;
 }
 
-ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
-                             double isovalue, double spacing, ov_watch watch, ov_judge *judge) {
-    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay), .watch = watch};
-    ov_body *const bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
+static ovoid_status mesh_original(ov_judge *judge, const double *xyzr, size_t atoms, double decay) {
+    ov_body *const bodies = ov_alloc(judge->context, atoms, sizeof *bodies, "atoms");
     if (!bodies)
         return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < atoms; ++i)
+        ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
+    const ovoid_status status = mesh_bodies(judge, bodies, atoms, &judge->mesh, &judge->content);
+    free(bodies);
+    return status;
+}
+
+ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
+                             double isovalue, double spacing, ov_watch watch, ov_judge *judge) {
+    ovoid_status status = OVOID_OK;
+    ov_judge made = {.context = context, .root_2d = sqrt(2.0 * decay), .watch = watch};
     ovoid_mesh_options_init(&made.meshing, sizeof made.meshing);
     made.meshing.isovalue = isovalue;
     made.meshing.spacing = spacing;
     middle_of(xyzr, atoms, made.origin);
-    for (size_t i = 0; i < atoms; ++i)
-        ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
-    const ovoid_status status = mesh_bodies(&made, bodies, atoms, &made.mesh, &made.content);
-    free(bodies);
-    if (status == OVOID_OK)
-        *judge = made;
-    else
+    OV_TRY(ov_marcher_create(context, &made.marcher));
+    OV_TRY(mesh_original(&made, xyzr, atoms, decay));
+    if (made.mesh) {
+        OV_TRY(ov_trail_create(context, made.mesh, false, &made.trail));
+        OV_TRY(ov_facets_set(context, &made.facets, &made.trail, made.origin));
+    }
+    *judge = made;
+cleanup:
+    if (status != OVOID_OK)
         ov_judge_destroy(&made);
     return status;
 }
 
 void ov_judge_destroy(ov_judge *judge) {
+    ov_marcher_destroy(&judge->marcher);
+    ov_meter_destroy(&judge->meter);
+    ov_facets_destroy(&judge->facets);
+    ov_facets_destroy(&judge->other);
+    ov_trail_destroy(&judge->trail);
     ovoid_mesh_destroy(&judge->mesh);
     memset(judge, 0, sizeof *judge);
 }
@@ -118,22 +134,57 @@ static void add_spots(const ovoid_mesh *mesh, const float *distance, double leas
         }
 }
 
-/* Keeps the worst of each neighbourhood. */
-static void thin_spots(ov_spot *spots, size_t *count, double apart, size_t most) {
-    size_t kept = 0;
-    qsort(spots, *count, sizeof *spots, by_distance);
-    for (size_t n = 0; n < *count && kept < most; ++n) {
-        bool near = false;
-        for (size_t m = 0; m < kept && !near; ++m) {
-            double square = 0.0;
-            for (int k = 0; k < 3; ++k)
-                square += (spots[n].at[k] - spots[m].at[k]) * (spots[n].at[k] - spots[m].at[k]);
-            near = square < apart * apart;
+/* What rounding may add to a distance in a grid, as a share. */
+#define ROUNDING 1e-4
+
+static ovoid_status grid_of_spots(ovoid_context *context, const ov_spot *spots, size_t count,
+                                  double apart, ov_grid *grid) {
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t n = 0; n < count; ++n)
+        for (size_t k = 0; k < 3; ++k) {
+            low[k] = fmin(low[k], spots[n].at[k]);
+            high[k] = fmax(high[k], spots[n].at[k]);
         }
-        if (!near)
-            spots[kept++] = spots[n];
+    return ov_grid_create(context, low, high, (1.0 + ROUNDING) * apart, count, count, grid);
+}
+
+/* Whether one of the spots in the grid is nearer than that. */
+static bool has_near(const ov_grid *grid, const ov_spot *spots, const double at[3], double apart) {
+    uint32_t near[2 * OV_NEAR_MAX];
+    const size_t count = ov_grid_near(grid, at, UINT32_MAX, near);
+    for (size_t n = 0; n < count; ++n) {
+        double square = 0.0;
+        for (size_t k = 0; k < 3; ++k)
+            square += (at[k] - spots[near[n]].at[k]) * (at[k] - spots[near[n]].at[k]);
+        if (square < apart * apart)
+            return true;
+    }
+    return false;
+}
+
+/* Keeps the worst of each neighbourhood. */
+static ovoid_status thin_spots(ovoid_context *context, ov_spot *spots, size_t *count, double apart,
+                               size_t most) {
+    ovoid_status status = OVOID_OK;
+    ov_grid grid = {0};
+    size_t kept = 0;
+    if (*count == 0)
+        return OVOID_OK;
+    qsort(spots, *count, sizeof *spots, by_distance);
+    if (apart > 0.0)
+        OV_TRY(grid_of_spots(context, spots, *count, apart, &grid));
+    for (size_t n = 0; n < *count && kept < most; ++n) {
+        if (apart > 0.0 && has_near(&grid, spots, spots[n].at, apart))
+            continue;
+        spots[kept] = spots[n];
+        if (apart > 0.0)
+            OV_TRY(ov_grid_add(context, &grid, spots[kept].at, (uint32_t)kept));
+        ++kept;
     }
     *count = kept;
+cleanup:
+    ov_grid_destroy(&grid);
+    return status;
 }
 
 static void judge_distances(const ovoid_mesh *mesh, const float *distance,
@@ -159,6 +210,7 @@ static void trial_destroy(trial *t) {
 
 static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
     ovoid_status status = OVOID_OK;
+    ov_trail trail = {0};
     ovoid_context *const context = judge->context;
     t->from_original =
         ov_alloc(context, judge->mesh->vertices, sizeof *t->from_original, "distances");
@@ -167,11 +219,15 @@ static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    OV_TRY(ov_vertex_distances(context, judge->mesh, t->mesh, judge->origin, enough, &judge->watch,
-                               t->from_original));
-    OV_TRY(ov_vertex_distances(context, t->mesh, judge->mesh, judge->origin, enough, &judge->watch,
-                               t->from_model));
+    judge->meter.watch = &judge->watch;
+    judge->meter.enough = enough;
+    OV_TRY(ov_trail_create(context, t->mesh, false, &trail));
+    OV_TRY(ov_facets_set(context, &judge->other, &trail, judge->origin));
+    OV_TRY(
+        ov_trail_distances(context, &judge->meter, &judge->other, &judge->trail, t->from_original));
+    OV_TRY(ov_trail_distances(context, &judge->meter, &judge->facets, &trail, t->from_model));
 cleanup:
+    ov_trail_destroy(&trail);
     return status;
 }
 
@@ -205,8 +261,7 @@ static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least,
         return OVOID_ERROR_MEMORY;
     add_spots(judge->mesh, t->from_original, least, *spots, spot_count);
     add_spots(t->mesh, t->from_model, least, *spots, spot_count);
-    thin_spots(*spots, spot_count, apart, most);
-    return OVOID_OK;
+    return thin_spots(judge->context, *spots, spot_count, apart, most);
 }
 
 ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
@@ -220,6 +275,11 @@ ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t 
     if (judgement->valid)
         OV_TRY(collect_spots(judge, &t, least, apart, most, spots, spot_count));
 cleanup:
+    if (status != OVOID_OK) {
+        free(*spots);
+        *spots = NULL;
+        *spot_count = 0;
+    }
     trial_destroy(&t);
     return status;
 }

@@ -5,18 +5,24 @@
 #define OV_JUDGE_H
 
 #include "field/quadric.h"
-#include "mesh/mesh.h"
+#include "measure/distance.h"
+#include "mesh/march.h"
 
-/* The original's surface, meshed once: a light mesh without normals. mesh is NULL where the field
- * never reaches the isovalue. */
+/* The original's surface, meshed once: a light mesh without normals, whose triangles stay on the
+ * device. mesh is NULL where the field never reaches the isovalue. */
 typedef struct ov_judge {
     ovoid_context *context;
     ovoid_mesh_options meshing;
     double origin[3]; /* of the meshes' offsets, angstrom */
     ovoid_mesh *mesh;
+    ov_trail trail; /* of the mesh */
     ov_content content;
     double root_2d; /* sqrt(2 decay), angstrom^-1 */
     ov_watch watch; /* asked during whatever takes long */
+    ov_marcher *marcher;
+    ov_meter meter;
+    ov_facets facets; /* of the original */
+    ov_facets other;  /* of the model at hand */
 } ov_judge;
 
 typedef struct ov_judgement {

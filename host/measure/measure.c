@@ -1,17 +1,17 @@
 #include "measure/measure.h"
 
+#include "base/progress.h"
 #include "base/sized.h"
 #include "measure/distance.h"
+#include "model/fields.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 void ovoid_measure_options_init(ovoid_measure_options *options, size_t size) {
-    static const ovoid_measure_options defaults = {.isovalue = OVOID_DEFAULT_ISOVALUE,
-                                                   .spacing = OVOID_DEFAULT_MESH_SPACING,
-                                                   .vertices = OVOID_VERTEX_EXACT,
-                                                   .distances = true};
+    static const ovoid_measure_options defaults = {
+        .spacing = OVOID_DEFAULT_MESH_SPACING, .vertices = OVOID_VERTEX_EXACT, .distances = true};
     ov_sized_init(options, size, &defaults, sizeof defaults);
 }
 
@@ -118,47 +118,53 @@ cleanup:
     return status;
 }
 
-/* Says which of the two surfaces failed. */
-static ovoid_status name_failure(ovoid_context *context, ovoid_status status, const char *which) {
+/* Says which of the two surfaces failed: of a molecule, or the first of two. */
+static ovoid_status name_failure(ovoid_context *context, ovoid_status status,
+                                 const ovoid_field *field, const ovoid_field *other,
+                                 const char *place) {
+    const char *const kind = ov_field_kind(field);
+    const bool alike = strcmp(kind, ov_field_kind(other)) == 0;
     const bool named = status != OVOID_OK && status != OVOID_ERROR_CANCELLED;
     char *const text = !named ? NULL : strdup(ovoid_context_error(context));
     if (text)
-        ov_fail(context, status, "the surface of the %s: %s", which, text);
+        ov_fail(context, status, "the surface of the %s%s: %s", alike ? place : "", kind, text);
     free(text);
     return status;
 }
 
-ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecule,
-                           const ovoid_model *model, const ovoid_measure_options *options,
-                           ovoid_measures *measures) {
+ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original, ovoid_field *sparse,
+                           const ovoid_measure_options *options, ovoid_measures *measures) {
     ovoid_status status = OVOID_OK;
-    ovoid_mesh *original = NULL, *sparse = NULL;
+    ovoid_mesh *first = NULL, *second = NULL;
     ovoid_measures made;
     ovoid_measure_options o;
     OV_NEED(context, context);
-    OV_NEED(context, molecule);
-    OV_NEED(context, model);
+    OV_NEED(context, original);
+    OV_NEED(context, sparse);
     OV_NEED(context, options);
     OV_NEED(context, measures);
     ov_progress_begin(context, "mesh");
+    OV_TRY(ov_field_check(context, original));
+    OV_TRY(ov_field_check(context, sparse));
     ovoid_measure_options_init(&o, sizeof o);
     OV_TRY(OV_SIZED_TAKE(context, ovoid_measure_options, options, &o));
     OV_TRY(ov_sized_check(context, "ovoid_measures", measures));
     const double begin = ov_seconds();
-    const ovoid_mesh_options meshing = {sizeof meshing, o.isovalue, o.spacing, o.vertices};
-    status = ovoid_molecule_mesh(context, molecule, ovoid_model_decay(model), &meshing, &original);
-    OV_TRY(name_failure(context, status, "molecule"));
-    status = ovoid_model_mesh(context, model, &meshing, &sparse);
-    OV_TRY(name_failure(context, status, "model"));
+    const double isovalue = o.isovalue == 0.0 ? original->isovalue : o.isovalue;
+    const ovoid_mesh_options meshing = {sizeof meshing, isovalue, o.spacing, o.vertices};
+    status = ovoid_field_mesh(context, original, &meshing, &first);
+    OV_TRY(name_failure(context, status, original, sparse, "first "));
+    status = ovoid_field_mesh(context, sparse, &meshing, &second);
+    OV_TRY(name_failure(context, status, sparse, original, "second "));
     const double meshed = ov_seconds();
     ov_progress_stage(context, "measure");
-    OV_TRY(ov_measure_meshes(context, original, sparse, o.vertices == OVOID_VERTEX_EXACT,
-                             o.distances, &made));
+    OV_TRY(ov_measure_meshes(context, first, second, o.vertices == OVOID_VERTEX_EXACT, o.distances,
+                             &made));
     made.seconds_mesh = meshed - begin;
     ov_sized_give(measures, &made, sizeof made);
 cleanup:
-    ovoid_mesh_destroy(&original);
-    ovoid_mesh_destroy(&sparse);
+    ovoid_mesh_destroy(&first);
+    ovoid_mesh_destroy(&second);
     ov_progress_end(context);
     return status;
 }

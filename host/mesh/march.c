@@ -7,6 +7,7 @@
 #include "mesh/specks.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,7 +25,8 @@ typedef struct piece_faces {
     cl_uint *crossing; /* CROSSING per face brick */
 } piece_faces;
 
-typedef struct marcher {
+/* What is of one mesh comes first, up to the grid; what follows may serve the next. */
+typedef struct ov_marcher {
     const ov_body *bodies;
     const ovoid_mesh_options *options;
     const double *origin; /* of the offsets of a light mesh, else NULL */
@@ -32,33 +34,8 @@ typedef struct marcher {
     ov_pieces pieces;
     piece_faces *faces; /* of each piece; empty where not needed, or no longer */
     size_t faces_end;   /* those from here on are gone */
-    ov_brick_grid grid;
-    uint64_t at[3]; /* the current piece */
+    uint64_t at[3];     /* the current piece */
     double corner[3];
-
-    ov_points points;
-    ov_terms terms;
-    ov_lists lists;
-    ov_operations operations;
-    ov_kernel signs, count, get, put, fill_vertices, fill_triangles, refine;
-    ov_buffer value, sign, crossing, triangle_count, cases, list, edge, t, normal, corners;
-    ov_buffer face_list, ghost_list, place, values, crossings;
-    size_t group;
-    cl_uint run;
-
-    ov_quadric *quadrics; /* of one piece */
-    size_t quadrics_capacity;
-    cl_uint *host_crossing; /* of the padded grid */
-    cl_uint *host_count;    /* triangles of each brick */
-    float *ghost_value;
-    cl_uint *ghost_crossing;
-    bool ghosts_empty; /* on the device */
-    cl_uint *active;   /* entries of march_vertices()'s list */
-    size_t active_count;
-    cl_uint *edges; /* of the piece's vertices, in packs */
-    size_t edges_capacity;
-    float *boxes, *refined;
-    size_t boxes_capacity, refined_capacity;
     float largest; /* value met while there was no vertex */
 
     double *xyz;    /* the mesh so far, */
@@ -70,17 +47,48 @@ typedef struct marcher {
     size_t xyz_capacity, offsets_capacity, normals_capacity, triangle_capacity;
     size_t vertices, triangles;
     size_t new_vertices, new_triangles; /* of the piece */
+    bool ghosts_empty;                  /* on the device */
+
+    ov_brick_grid grid;
+    double grid_spacing; /* angstrom */
+    ov_points points;
+    ov_terms terms;
+    ov_lists lists;
+    ov_operations operations;
+    ov_kernel signs, count, get, put, fill_vertices, fill_boxes, fill_triangles, refine;
+    ov_buffer value, sign, crossing, found, box, cases, list, edge, t, normal, corners;
+    ov_buffer face_list, ghost_list, place, values, crossings;
+    size_t group;
+    cl_uint run;
+
+    ov_quadric *quadrics; /* of one piece */
+    size_t quadrics_capacity;
+    cl_uint *host_found; /* vertices and triangles of each brick, as of march_count() */
+    float *ghost_value;
+    cl_uint *ghost_crossing;
+    cl_uint *active; /* entries of march_vertices()'s list */
+    size_t active_count;
+    cl_uint *edges; /* of the piece's vertices, in packs */
+    size_t edges_capacity;
+    cl_int *lattice_boxes; /* of packs of vertices, in lattice points and in angstrom */
+    float *boxes, *refined;
+    size_t lattice_boxes_capacity, boxes_capacity, refined_capacity;
 } marcher;
+
+static const uint64_t brick_points[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
 /* ---- setting up --------------------------------------------------------------------------- */
 
 static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
+    if (m->refine.handle)
+        return OVOID_OK;
     static const char *const names[] = {
-        "march_signs",    "march_count",     "march_get",    "march_put",
-        "march_vertices", "march_triangles", "march_refine",
+        "march_signs",    "march_count", "march_get",       "march_put",
+        "march_vertices", "march_boxes", "march_triangles", "march_refine",
     };
-    ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
-                                  &m->fill_vertices, &m->fill_triangles, &m->refine};
+    ov_kernel *const kernels[] = {
+        &m->signs,      &m->count,          &m->get,   &m->put, &m->fill_vertices,
+        &m->fill_boxes, &m->fill_triangles, &m->refine};
     for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k) {
         const ovoid_status status = ov_kernel_create(context, "march", names[k], kernels[k]);
         if (status != OVOID_OK)
@@ -94,9 +102,6 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     const ov_brick_grid *const grid = &m->grid;
     const size_t padded = grid->padded_total, faces = grid->face_start[3];
     const size_t moved = faces > grid->ghosts ? faces : grid->ghosts;
-    ov_case_table cases;
-    ov_case_table_make(&cases);
-    OV_TRY(ov_buffer_put(context, &m->cases, &cases, sizeof cases, "cases of marching cubes"));
     OV_TRY(ov_buffer_put(context, &m->face_list, grid->face, faces * sizeof(cl_uint),
                          "lattice bricks"));
     OV_TRY(ov_buffer_put(context, &m->ghost_list, grid->ghost, grid->ghosts * sizeof(cl_uint),
@@ -108,22 +113,51 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
     OV_TRY(ov_buffer_reserve(context, &m->sign, padded * sizeof(cl_uint), "signs of bricks"));
     OV_TRY(ov_buffer_reserve(context, &m->crossing, padded * CROSSING * sizeof(cl_uint),
                              "crossings of bricks"));
-    OV_TRY(ov_buffer_reserve(context, &m->triangle_count, grid->total * sizeof(cl_uint),
-                             "triangles of bricks"));
+    OV_TRY(
+        ov_buffer_reserve(context, &m->found, grid->total * sizeof(cl_uint), "vertices of bricks"));
     OV_TRY(
         ov_buffer_reserve(context, &m->values, moved * OV_PACK * sizeof(float), "values at faces"));
     OV_TRY(ov_buffer_reserve(context, &m->crossings, moved * CROSSING * sizeof(cl_uint),
                              "crossings at faces"));
-    m->host_crossing = ov_alloc(context, padded * CROSSING, sizeof(cl_uint), "crossings of bricks");
-    m->host_count = ov_alloc(context, grid->total, sizeof(cl_uint), "triangles of bricks");
+    m->host_found = ov_alloc(context, grid->total, sizeof(cl_uint), "vertices of bricks");
     m->active = ov_alloc(context, grid->total * 4, sizeof(cl_uint), "bricks at the surface");
     m->ghost_value = ov_alloc(context, moved * OV_PACK, sizeof(float), "values at faces");
     m->ghost_crossing = ov_alloc(context, moved * CROSSING, sizeof(cl_uint), "crossings at faces");
-    m->faces = ov_alloc(context, m->pieces.pieces, sizeof *m->faces, "pieces of the lattice");
-    m->faces_end = m->pieces.pieces;
-    if (!m->host_crossing || !m->host_count || !m->active || !m->ghost_value ||
-        !m->ghost_crossing || !m->faces)
+    if (!m->host_found || !m->active || !m->ghost_value || !m->ghost_crossing)
         status = OVOID_ERROR_MEMORY;
+cleanup:
+    return status;
+}
+
+static bool has_grid(const marcher *m) {
+    for (size_t axis = 0; axis < 3; ++axis)
+        if (m->grid.bricks[axis] * brick_points[axis] != m->pieces.size[axis])
+            return false;
+    return m->grid_spacing == m->pieces.spacing;
+}
+
+static void drop_grid(marcher *m) {
+    void *const memory[] = {m->host_found, m->active, m->ghost_value, m->ghost_crossing};
+    for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
+        free(memory[k]);
+    m->host_found = m->active = m->ghost_crossing = NULL;
+    m->ghost_value = NULL;
+    ov_brick_grid_destroy(&m->grid);
+    ov_points_destroy(&m->points);
+    m->grid_spacing = 0.0;
+}
+
+/* A grid of bricks for pieces of this size, unless the last mesh's is one. */
+static ovoid_status lay_grid(ovoid_context *context, marcher *m) {
+    ovoid_status status = OVOID_OK;
+    const double step[3] = {m->pieces.spacing, m->pieces.spacing, m->pieces.spacing};
+    if (has_grid(m))
+        return OVOID_OK;
+    drop_grid(m);
+    OV_TRY(ov_brick_grid_create(context, m->pieces.size, &m->grid));
+    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
+    OV_TRY(reserve_piece(context, m));
+    m->grid_spacing = m->pieces.spacing;
 cleanup:
     return status;
 }
@@ -131,14 +165,18 @@ cleanup:
 static ovoid_status set_up(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
-    const double step[3] = {m->pieces.spacing, m->pieces.spacing, m->pieces.spacing};
+    ov_case_table cases;
+    ov_case_table_make(&cases);
     OV_TRY(ov_device_get(context, &device));
     m->group = ov_item_group(device);
     m->run = device->shape.lanes == 1 ? BRICK_RUN : 1;
     OV_TRY(make_kernels(context, m));
-    OV_TRY(ov_brick_grid_create(context, m->pieces.size, &m->grid));
-    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
-    OV_TRY(reserve_piece(context, m));
+    OV_TRY(ov_buffer_put(context, &m->cases, &cases, sizeof cases, "cases of marching cubes"));
+    OV_TRY(lay_grid(context, m));
+    m->faces = ov_alloc(context, m->pieces.pieces, sizeof *m->faces, "pieces of the lattice");
+    m->faces_end = m->pieces.pieces;
+    if (!m->faces)
+        status = OVOID_ERROR_MEMORY;
 cleanup:
     return status;
 }
@@ -231,12 +269,12 @@ static ovoid_status keep_faces(ovoid_context *context, marcher *m, size_t piece)
     if (!kept->value || !kept->crossing)
         return OVOID_ERROR_MEMORY;
     OV_TRY(OV_LAUNCH(context, &m->get, faces, m->group, OV_ARG(count), OV_ARG(m->face_list.memory),
-                     OV_ARG(m->place.memory), OV_ARG(m->value.memory), OV_ARG(m->values.memory)));
+                     OV_ARG(m->place.memory), OV_ARG(m->value.memory), OV_ARG(m->crossing.memory),
+                     OV_ARG(m->values.memory), OV_ARG(m->crossings.memory)));
     OV_TRY(
         ov_buffer_read(context, &m->values, 0, kept->value, faces * OV_PACK * sizeof *kept->value));
-    for (size_t k = 0; k < faces; ++k)
-        memcpy(kept->crossing + k * CROSSING, m->host_crossing + grid->face[k] * CROSSING,
-               CROSSING * sizeof *kept->crossing);
+    OV_TRY(ov_buffer_read(context, &m->crossings, 0, kept->crossing,
+                          faces * CROSSING * sizeof *kept->crossing));
 cleanup:
     return status;
 }
@@ -281,13 +319,6 @@ cleanup:
     return status;
 }
 
-static size_t bits_in(cl_uint mask) {
-    size_t count = 0;
-    for (; mask; mask &= mask - 1)
-        ++count;
-    return count;
-}
-
 /* Numbers vertices and triangles along the curve, and lists the bricks that have some. */
 static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
     const ov_brick_grid *const grid = &m->grid;
@@ -296,19 +327,16 @@ static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
     m->active_count = 0;
     for (size_t i = 0; i < grid->total; ++i) {
         const uint32_t k = grid->curve[i];
-        const cl_uint brick = ov_brick_number(grid, k % nx, k / nx % ny, k / (nx * ny));
-        cl_uint *const crossing = m->host_crossing + (size_t)brick * CROSSING;
-        const size_t own = bits_in(crossing[1]) + bits_in(crossing[2]) + bits_in(crossing[3]);
-        crossing[0] = (cl_uint)(m->vertices + vertices);
-        if (own == 0 && m->host_count[k] == 0)
+        const cl_uint found = m->host_found[k];
+        if (found == 0)
             continue;
         cl_uint *const entry = m->active + 4 * m->active_count++;
-        entry[0] = brick;
+        entry[0] = ov_brick_number(grid, k % nx, k / nx % ny, k / (nx * ny));
         entry[1] = (cl_uint)vertices;
         entry[2] = (cl_uint)triangles;
-        entry[3] = 0;
-        vertices += own;
-        triangles += m->host_count[k];
+        entry[3] = (cl_uint)(m->vertices + vertices);
+        vertices += found & 255u;
+        triangles += found >> 8;
     }
     m->new_vertices = vertices;
     m->new_triangles = triangles;
@@ -330,12 +358,9 @@ static ovoid_status classify(ovoid_context *context, marcher *m) {
                      OV_ARG(m->value.memory), OV_ARG(m->sign.memory)));
     OV_TRY(OV_LAUNCH(context, &m->count, (grid->total + m->run - 1) / m->run, m->group, OV_ARG(nx),
                      OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->sign.memory),
-                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
-                     OV_ARG(m->triangle_count.memory)));
-    OV_TRY(ov_buffer_read(context, &m->crossing, 0, m->host_crossing,
-                          grid->padded_total * CROSSING * sizeof *m->host_crossing));
-    OV_TRY(ov_buffer_read(context, &m->triangle_count, 0, m->host_count,
-                          grid->total * sizeof *m->host_count));
+                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory), OV_ARG(m->found.memory)));
+    OV_TRY(
+        ov_buffer_read(context, &m->found, 0, m->host_found, grid->total * sizeof *m->host_found));
     OV_TRY(number_bricks(context, m));
 cleanup:
     return status;
@@ -349,27 +374,30 @@ static cl_uint read_edge(cl_uint edge, cl_uint at[3]) {
     return edge >> 20 & 3u;
 }
 
-/* The box of each pack of vertices, wherever on their edges they come to lie. */
-static void box_packs(const marcher *m, size_t packs) {
-    for (size_t pack = 0; pack < packs; ++pack) {
-        float *const box = m->boxes + pack * BOX;
-        for (size_t j = 0; j < OV_PACK; ++j) {
-            cl_uint at[3];
-            const cl_uint along = read_edge(m->edges[pack * OV_PACK + j], at);
-            for (cl_uint axis = 0; axis < 3; ++axis) {
-                const float low = (float)(at[axis] * m->pieces.spacing);
-                const float high = (float)((at[axis] + (axis == along)) * m->pieces.spacing);
-                box[axis] = j == 0 ? low : fminf(box[axis], low);
-                box[axis + 3] = j == 0 ? high : fmaxf(box[axis + 3], high);
-            }
-        }
-    }
+/* The box of each pack of vertices. */
+static ovoid_status box_packs(ovoid_context *context, marcher *m, size_t packs) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint packs_count = (cl_uint)packs, vertices = (cl_uint)m->new_vertices;
+    OV_TRY(ov_buffer_reserve(context, &m->box, packs * BOX * sizeof(cl_int), "boxes of vertices"));
+    OV_TRY(OV_LAUNCH(context, &m->fill_boxes, packs, m->group, OV_ARG(packs_count),
+                     OV_ARG(vertices), OV_ARG(m->edge.memory), OV_ARG(m->t.memory),
+                     OV_ARG(m->box.memory)));
+    OV_TRY(ov_grow(context, &m->lattice_boxes, &m->lattice_boxes_capacity, packs * BOX,
+                   sizeof *m->lattice_boxes, "boxes of vertices"));
+    OV_TRY(ov_grow(context, &m->boxes, &m->boxes_capacity, packs * BOX, sizeof *m->boxes,
+                   "boxes of vertices"));
+    OV_TRY(ov_buffer_read(context, &m->box, 0, m->lattice_boxes,
+                          packs * BOX * sizeof *m->lattice_boxes));
+    for (size_t k = 0; k < packs * BOX; ++k)
+        m->boxes[k] = (float)(m->lattice_boxes[k] * m->pieces.spacing);
+cleanup:
+    return status;
 }
 
-/* Edges and first positions of the piece's vertices; the last pack is filled up with its last. */
+/* Edges, numbers and first positions of the piece's vertices. */
 static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t packs) {
     ovoid_status status = OVOID_OK;
-    const size_t count = m->new_vertices, room = packs * OV_PACK;
+    const size_t room = packs * OV_PACK;
     const cl_uint active = (cl_uint)m->active_count, nx = (cl_uint)m->grid.bricks[0],
                   ny = (cl_uint)m->grid.bricks[1];
     const cl_float isovalue = (cl_float)m->options->isovalue;
@@ -380,17 +408,6 @@ static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t pac
                      OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(isovalue),
                      OV_ARG(logarithmic), OV_ARG(m->place.memory), OV_ARG(m->value.memory),
                      OV_ARG(m->crossing.memory), OV_ARG(m->edge.memory), OV_ARG(m->t.memory)));
-    OV_TRY(ov_grow(context, &m->edges, &m->edges_capacity, room, sizeof *m->edges, "vertices"));
-    OV_TRY(
-        ov_grow(context, &m->refined, &m->refined_capacity, room, sizeof *m->refined, "vertices"));
-    OV_TRY(ov_buffer_read(context, &m->edge, 0, m->edges, count * sizeof *m->edges));
-    OV_TRY(ov_buffer_read(context, &m->t, 0, m->refined, count * sizeof *m->refined));
-    for (size_t k = count; k < room; ++k) {
-        m->edges[k] = m->edges[count - 1];
-        m->refined[k] = m->refined[count - 1];
-    }
-    OV_TRY(ov_buffer_write(context, &m->edge, 0, m->edges, room * sizeof *m->edges));
-    OV_TRY(ov_buffer_write(context, &m->t, 0, m->refined, room * sizeof *m->refined));
 cleanup:
     return status;
 }
@@ -401,9 +418,7 @@ static ovoid_status list_terms(ovoid_context *context, marcher *m, size_t packs)
     ov_points points = {.count = packs * OV_PACK, .packs = packs};
     float *tree = NULL;
     size_t floats = 0;
-    OV_TRY(ov_grow(context, &m->boxes, &m->boxes_capacity, packs * BOX, sizeof *m->boxes,
-                   "boxes of vertices"));
-    box_packs(m, packs);
+    OV_TRY(box_packs(context, m, packs));
     OV_TRY(ov_tree_build(context, m->boxes, packs, &points.tree, &tree, &floats));
     OV_TRY(ov_buffer_put(context, &points.boxes, tree, floats * sizeof *tree, "boxes of vertices"));
     OV_TRY(ov_lists_build(context, &m->lists, &points, &m->terms, 0.0));
@@ -463,6 +478,8 @@ static ovoid_status take_vertices(ovoid_context *context, marcher *m, size_t pac
                    "vertices"));
     OV_TRY(grow_vertices(context, m, total));
     float *const t = m->refined, *const normal = t + values;
+    OV_TRY(ov_grow(context, &m->edges, &m->edges_capacity, values, sizeof *m->edges, "vertices"));
+    OV_TRY(ov_buffer_read(context, &m->edge, 0, m->edges, m->new_vertices * sizeof *m->edges));
     OV_TRY(ov_buffer_read(context, &m->t, 0, t, values * sizeof *t));
     OV_TRY(ov_buffer_read(context, &m->normal, 0, normal, 3 * values * sizeof *normal));
     for (size_t k = 0; k < m->new_vertices; ++k) {
@@ -511,11 +528,10 @@ static ovoid_status take_piece(ovoid_context *context, marcher *m) {
         return OVOID_OK;
     OV_TRY(ov_buffer_put(context, &m->list, m->active, m->active_count * 4 * sizeof *m->active,
                          "bricks at the surface"));
-    OV_TRY(ov_buffer_write(context, &m->crossing, 0, m->host_crossing,
-                           m->grid.padded_total * CROSSING * sizeof *m->host_crossing));
+    if (m->new_vertices > 0)
+        OV_TRY(fill_vertices(context, m, packs));
     OV_TRY(take_triangles(context, m));
     if (m->new_vertices > 0) {
-        OV_TRY(fill_vertices(context, m, packs));
         OV_TRY(list_terms(context, m, packs));
         OV_TRY(refine(context, m, packs));
         OV_TRY(take_vertices(context, m, packs));
@@ -720,45 +736,41 @@ static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
 
 /* ---- all of it ---------------------------------------------------------------------------- */
 
-/* Frees all but the mesh. */
+/* Frees what the next mesh cannot use, the mesh itself among it. */
+static void end_mesh(marcher *m) {
+    for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
+        drop_faces(&m->faces[k]);
+    free(m->faces);
+    free(m->xyz);
+    free(m->offsets);
+    free(m->edge_of);
+    free(m->normals);
+    free(m->triangle);
+    ov_pieces_destroy(&m->pieces);
+    memset(m, 0, offsetof(marcher, grid));
+}
+
+/* Frees what it works with. */
 static void release_work(marcher *m) {
-    ov_buffer *const buffers[] = {&m->value,  &m->sign,    &m->crossing,  &m->triangle_count,
-                                  &m->cases,  &m->list,    &m->edge,      &m->t,
-                                  &m->normal, &m->corners, &m->face_list, &m->ghost_list,
-                                  &m->place,  &m->values,  &m->crossings};
-    ov_kernel *const kernels[] = {&m->signs,         &m->count,          &m->get,   &m->put,
-                                  &m->fill_vertices, &m->fill_triangles, &m->refine};
-    void *const memory[] = {m->quadrics,    m->host_crossing,  m->host_count,
-                            m->ghost_value, m->ghost_crossing, m->active,
-                            m->edges,       m->boxes,          m->refined};
+    ov_buffer *const buffers[] = {&m->value,      &m->sign,   &m->crossing, &m->found,
+                                  &m->box,        &m->cases,  &m->list,     &m->edge,
+                                  &m->t,          &m->normal, &m->corners,  &m->face_list,
+                                  &m->ghost_list, &m->place,  &m->values,   &m->crossings};
+    ov_kernel *const kernels[] = {
+        &m->signs,      &m->count,          &m->get,   &m->put, &m->fill_vertices,
+        &m->fill_boxes, &m->fill_triangles, &m->refine};
+    void *const memory[] = {m->quadrics, m->edges, m->lattice_boxes, m->boxes, m->refined};
+    drop_grid(m);
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
         ov_kernel_destroy(kernels[k]);
     for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
         free(memory[k]);
-    m->quadrics = NULL;
-    m->host_crossing = m->host_count = m->ghost_crossing = m->active = m->edges = NULL;
-    m->ghost_value = m->boxes = m->refined = NULL;
-    for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
-        drop_faces(&m->faces[k]);
-    free(m->faces);
-    m->faces = NULL;
-    ov_brick_grid_destroy(&m->grid);
-    ov_pieces_destroy(&m->pieces);
-    ov_points_destroy(&m->points);
     ov_terms_destroy(&m->terms);
     ov_lists_destroy(&m->lists);
     ov_operations_destroy(&m->operations);
-}
-
-static void destroy_marcher(marcher *m) {
-    release_work(m);
-    free(m->xyz);
-    free(m->offsets);
-    free(m->edge_of);
-    free(m->normals);
-    free(m->triangle);
+    memset((char *)m + offsetof(marcher, grid), 0, sizeof *m - offsetof(marcher, grid));
 }
 
 /* Gives back what growing has taken too much. */
@@ -832,38 +844,59 @@ cleanup:
     return status;
 }
 
-static ovoid_status march(ovoid_context *context, const ov_body *bodies, size_t count,
-                          const ovoid_mesh_options *options, const uint64_t limit[3],
-                          const double *origin, const ov_watch *watch, bool specks,
-                          ovoid_mesh **mesh) {
+/* How a mesh is to be made, beside its options. */
+typedef struct plan_of_mesh {
+    const uint64_t *limit;
+    const double *origin; /* of a light mesh, else NULL */
+    const ov_watch *watch;
+    bool specks;
+} plan_of_mesh;
+
+static ovoid_status march_with(ovoid_context *context, marcher *m, size_t count,
+                               const plan_of_mesh *how) {
     ovoid_status status = OVOID_OK;
-    marcher m = {.bodies = bodies, .options = options, .origin = origin, .watch = watch};
-    OV_TRY(plan(context, &m, count, limit));
-    if (m.pieces.pieces > 0)
-        OV_TRY(set_up(context, &m));
-    OV_TRY(march_pieces(context, &m));
-    if (specks && m.pieces.pieces > 0)
-        OV_TRY(add_specks(context, &m, count));
-    if (m.vertices == 0)
-        OV_TRY(fail_empty(context, &m));
-    OV_TRY(mend_normals(context, &m));
-    release_work(&m); /* what is left is the mesh */
-    OV_TRY(adopt(context, &m, mesh));
+    OV_TRY(plan(context, m, count, how->limit));
+    if (m->pieces.pieces > 0)
+        OV_TRY(set_up(context, m));
+    OV_TRY(march_pieces(context, m));
+    if (how->specks && m->pieces.pieces > 0)
+        OV_TRY(add_specks(context, m, count));
+    if (m->vertices == 0)
+        OV_TRY(fail_empty(context, m));
+    OV_TRY(mend_normals(context, m));
 cleanup:
-    destroy_marcher(&m);
+    return status;
+}
+
+/* kept: a marcher for this mesh and the next, or NULL. */
+static ovoid_status march(ovoid_context *context, marcher *kept, const ov_body *bodies,
+                          size_t count, const ovoid_mesh_options *options, const plan_of_mesh *how,
+                          ovoid_mesh **mesh) {
+    marcher own = {0}, *const m = kept ? kept : &own;
+    m->bodies = bodies;
+    m->options = options;
+    m->origin = how->origin;
+    m->watch = how->watch;
+    ovoid_status status = march_with(context, m, count, how);
+    if (!kept)
+        release_work(m); /* what is left is the mesh */
+    if (status == OVOID_OK)
+        status = adopt(context, m, mesh);
+    end_mesh(m);
     return status;
 }
 
 ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t count,
                       const ovoid_mesh_options *options, const uint64_t limit[3],
                       ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, NULL, NULL, false, mesh);
+    return march(context, NULL, bodies, count, options, &(plan_of_mesh){.limit = limit}, mesh);
 }
 
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
                             const double origin[3], const ov_watch *watch, ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, limit, origin, watch, false, mesh);
+    return march(context, NULL, bodies, count, options,
+                 &(plan_of_mesh){.limit = limit, .origin = origin, .watch = watch}, mesh);
 }
 
 static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
@@ -871,8 +904,8 @@ static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
 ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, ovoid_mesh **mesh) {
     ovoid_mesh *made = NULL;
-    const ovoid_status status =
-        march(context, bodies, count, options, piece_limit, NULL, NULL, true, &made);
+    const ovoid_status status = march(context, NULL, bodies, count, options,
+                                      &(plan_of_mesh){.limit = piece_limit, .specks = true}, &made);
     if (status != OVOID_OK)
         return status;
     if (made->missed > 0)
@@ -886,8 +919,27 @@ ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_
     return OVOID_OK;
 }
 
-ovoid_status ov_mesh_bodies_light(ovoid_context *context, const ov_body *bodies, size_t count,
-                                  const ovoid_mesh_options *options, const double origin[3],
-                                  const ov_watch *watch, ovoid_mesh **mesh) {
-    return march(context, bodies, count, options, piece_limit, origin, watch, true, mesh);
+ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **result) {
+    ov_marcher *const made = ov_alloc(context, 1, sizeof *made, "what meshing takes");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    *result = made;
+    return OVOID_OK;
+}
+
+void ov_marcher_destroy(ov_marcher **kept) {
+    if (!*kept)
+        return;
+    release_work(*kept);
+    free(*kept);
+    *kept = NULL;
+}
+
+ovoid_status ov_mesh_bodies_light(ovoid_context *context, ov_marcher *kept, const ov_body *bodies,
+                                  size_t count, const ovoid_mesh_options *options,
+                                  const double origin[3], const ov_watch *watch,
+                                  ovoid_mesh **mesh) {
+    const plan_of_mesh how = {
+        .limit = piece_limit, .origin = origin, .watch = watch, .specks = true};
+    return march(context, kept, bodies, count, options, &how, mesh);
 }

@@ -32,10 +32,17 @@ ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_
                             const ovoid_mesh_options *options, const uint64_t limit[3],
                             const double origin[3], const ov_watch *watch, ovoid_mesh **mesh);
 
+/* What meshing takes of the device and of memory, for one mesh after the other: pays where their
+ * lattices are cut alike, as those of a model that changes here and there. */
+typedef struct ov_marcher ov_marcher;
+ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **marcher);
+void ov_marcher_destroy(ov_marcher **marcher);
+
 /* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). */
 ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, ovoid_mesh **mesh);
-ovoid_status ov_mesh_bodies_light(ovoid_context *context, const ov_body *bodies, size_t count,
+ovoid_status ov_mesh_bodies_light(ovoid_context *context, ov_marcher *marcher,
+                                  const ov_body *bodies, size_t count,
                                   const ovoid_mesh_options *options, const double origin[3],
                                   const ov_watch *watch, ovoid_mesh **mesh);
 

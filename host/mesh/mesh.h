@@ -37,6 +37,12 @@ static inline void ov_mesh_at(const ovoid_mesh *mesh, size_t vertex, double at[3
                           : mesh->origin[k] + (double)mesh->offsets[3 * vertex + k];
 }
 
+/* Whether its offsets count from there. */
+static inline bool ov_mesh_is_about(const ovoid_mesh *mesh, const double origin[3]) {
+    return mesh->offsets && mesh->origin[0] == origin[0] && mesh->origin[1] == origin[1] &&
+           mesh->origin[2] == origin[2];
+}
+
 static inline void ov_mesh_centre(const ovoid_mesh *mesh, size_t triangle, double centre[3]) {
     double at[3][3];
     for (size_t i = 0; i < 3; ++i)

@@ -1,8 +1,9 @@
-/* The public functions that mesh a molecule's or a model's surface. */
+/* From a field to a mesh of its surface. */
+#include "base/progress.h"
 #include "base/sized.h"
 #include "field/field.h"
 #include "mesh/march.h"
-#include "model/model.h"
+#include "model/fields.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +14,6 @@
 
 void ovoid_mesh_options_init(ovoid_mesh_options *options, size_t size) {
     static const ovoid_mesh_options defaults = {
-        .isovalue = OVOID_DEFAULT_ISOVALUE,
         .spacing = OVOID_DEFAULT_MESH_SPACING,
         .vertices = OVOID_VERTEX_EXACT,
     };
@@ -22,11 +22,13 @@ void ovoid_mesh_options_init(ovoid_mesh_options *options, size_t size) {
 
 /* The caller's options, whole and within their ranges. */
 static ovoid_status take_options(ovoid_context *context, const ovoid_mesh_options *given,
-                                 ovoid_mesh_options *options) {
+                                 const ovoid_field *field, ovoid_mesh_options *options) {
     ovoid_mesh_options_init(options, sizeof *options);
     const ovoid_status status = OV_SIZED_TAKE(context, ovoid_mesh_options, given, options);
     if (status != OVOID_OK)
         return status;
+    if (options->isovalue == 0.0)
+        options->isovalue = field->isovalue;
     if (!(options->isovalue >= ISOVALUE_MIN && options->isovalue <= ISOVALUE_MAX))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue %g is not between %g and %g",
                        options->isovalue, ISOVALUE_MIN, ISOVALUE_MAX);
@@ -39,72 +41,44 @@ static ovoid_status take_options(ovoid_context *context, const ovoid_mesh_option
     return OVOID_OK;
 }
 
-ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *molecule,
-                                 double decay, const ovoid_mesh_options *options,
-                                 ovoid_mesh **mesh) {
-    ovoid_status status = OVOID_OK;
-    ov_body *bodies = NULL;
-    ovoid_mesh_options o;
-    OV_NEED(context, context);
-    OV_NEED(context, molecule);
-    OV_NEED(context, options);
-    OV_NEED(context, mesh);
-    if (!(decay > 0.0 && decay <= 100.0))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
-                       decay);
-    const size_t atoms = ovoid_molecule_atoms(molecule);
-    const double *const xyzr = ovoid_molecule_xyzr(molecule);
-    ov_progress_begin(context, "mesh");
-    OV_TRY(take_options(context, options, &o));
-    OV_TRY(ov_atoms_check(context, xyzr, atoms, decay));
-    bodies = ov_alloc(context, atoms, sizeof *bodies, "atoms");
-    if (!bodies)
-        OV_TRY(OVOID_ERROR_MEMORY);
-    for (size_t i = 0; i < atoms; ++i)
-        ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
-    OV_TRY(ov_mesh_bodies(context, bodies, atoms, &o, mesh));
-cleanup:
-    free(bodies);
-    ov_progress_end(context);
-    return status;
-}
-
 /* Names an ellipsoid that the kernels' floats cannot hold by its number in the model. */
-static ovoid_status check_ellipsoids(ovoid_context *context, const ov_body *bodies, size_t count,
+static ovoid_status check_ellipsoids(ovoid_context *context, const ovoid_field *field,
                                      double cutoff) {
-    ovoid_status status = OVOID_OK;
     ov_terms terms = {0};
-    ov_quadric *const quadrics = ov_alloc(context, count, sizeof *quadrics, "ellipsoids");
-    if (!quadrics)
-        return OVOID_ERROR_MEMORY;
-    for (size_t i = 0; i < count; ++i)
-        quadrics[i] = bodies[i].quadric;
-    OV_TRY(ov_terms_set(context, &terms, quadrics, count, quadrics[0].centre, cutoff));
-cleanup:
+    const ovoid_status status = ov_terms_set(context, &terms, field->quadrics, field->count,
+                                             field->quadrics[0].centre, cutoff);
     ov_terms_destroy(&terms);
-    free(quadrics);
     return status;
 }
 
-ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
+/* Where the Gaussians reach: what their parameters tell more exactly than their quadratic forms. */
+static ov_body *bodies_of(ovoid_context *context, const ovoid_field *field) {
+    ov_body *const bodies = ov_alloc(context, field->count, sizeof *bodies, "a surface's terms");
+    for (size_t i = 0; bodies && i < field->count; ++i)
+        if (field->model)
+            ov_body_of_ellipsoid(&field->model->ellipsoids[i], &bodies[i]);
+        else
+            ov_body_of_ball(&field->quadrics[i], field->decay, &bodies[i]);
+    return bodies;
+}
+
+ovoid_status ovoid_field_mesh(ovoid_context *context, ovoid_field *field,
                               const ovoid_mesh_options *options, ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
     ov_body *bodies = NULL;
     ovoid_mesh_options o;
     OV_NEED(context, context);
-    OV_NEED(context, model);
+    OV_NEED(context, field);
     OV_NEED(context, options);
     OV_NEED(context, mesh);
     ov_progress_begin(context, "mesh");
-    OV_TRY(take_options(context, options, &o));
-    bodies = ov_alloc(context, model->count, sizeof *bodies, "ellipsoids");
-    if (!bodies)
+    OV_TRY(ov_field_check(context, field));
+    OV_TRY(take_options(context, options, field, &o));
+    if (!(bodies = bodies_of(context, field)))
         OV_TRY(OVOID_ERROR_MEMORY);
-    for (size_t i = 0; i < model->count; ++i)
-        ov_body_of_ellipsoid(&model->ellipsoids[i], &bodies[i]);
-    if (model->count > 0)
-        OV_TRY(check_ellipsoids(context, bodies, model->count, OV_MARCH_CUTOFF * o.isovalue));
-    OV_TRY(ov_mesh_bodies(context, bodies, model->count, &o, mesh));
+    if (field->model)
+        OV_TRY(check_ellipsoids(context, field, OV_MARCH_CUTOFF * o.isovalue));
+    OV_TRY(ov_mesh_bodies(context, bodies, field->count, &o, mesh));
 cleanup:
     free(bodies);
     ov_progress_end(context);

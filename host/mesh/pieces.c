@@ -9,7 +9,13 @@
 #include <string.h>
 
 void ov_body_of_atom(const double xyzr[4], double decay, ov_body *body) {
-    ov_quadric_of_atom(xyzr, decay, &body->quadric);
+    ov_quadric quadric;
+    ov_quadric_of_atom(xyzr, decay, &quadric);
+    ov_body_of_ball(&quadric, decay, body);
+}
+
+void ov_body_of_ball(const ov_quadric *quadric, double decay, ov_body *body) {
+    body->quadric = *quadric;
     for (int axis = 0; axis < 3; ++axis)
         body->extent[axis] = 1.0 / sqrt(decay);
     body->least = 1.0 / sqrt(decay);

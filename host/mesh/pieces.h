@@ -17,6 +17,8 @@ typedef struct ov_body {
 } ov_body;
 
 void ov_body_of_atom(const double xyzr[4], double decay, ov_body *body);
+/* Of the Gaussian of an atom. */
+void ov_body_of_ball(const ov_quadric *quadric, double decay, ov_body *body);
 void ov_body_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_body *body);
 
 /* The s up to which a term is at least `value`; negative where it nowhere is. */

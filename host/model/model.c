@@ -145,6 +145,20 @@ ovoid_status ov_model_add_note(ovoid_context *context, ovoid_model *model, const
     return OVOID_OK;
 }
 
+ovoid_status ov_model_copy(ovoid_context *context, const ovoid_model *model, ovoid_model **copy) {
+    ovoid_status status = OVOID_OK;
+    ovoid_model *made = NULL;
+    OV_TRY(ovoid_model_create(context, model->ellipsoids, model->count, model->decay,
+                              model->isovalue, &made));
+    for (size_t i = 0; i < model->note_count; i++)
+        OV_TRY(ov_model_add_note(context, made, model->notes[i], strlen(model->notes[i])));
+    *copy = made;
+    made = NULL;
+cleanup:
+    ovoid_model_destroy(&made);
+    return status;
+}
+
 ovoid_status ovoid_model_annotate(ovoid_context *context, ovoid_model *model, const char *key,
                                   const char *value) {
     OV_NEED(context, context);

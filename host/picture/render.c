@@ -2,8 +2,7 @@
 
 #include "base/progress.h"
 #include "base/sized.h"
-#include "model/ellipsoid.h"
-#include "model/model.h"
+#include "model/fields.h"
 #include "picture/colour_bar.h"
 #include "picture/image.h"
 
@@ -32,7 +31,6 @@ void ovoid_picture_options_init(ovoid_picture_options *options, size_t size) {
         .width = 1200,
         .height = 900,
         .samples = 3,
-        .isovalue = OVOID_DEFAULT_ISOVALUE,
         .centre = {NAN, NAN, NAN},
         .original = 0x5b9bd5ff,
         .model = 0xf2a64bff,
@@ -44,9 +42,11 @@ void ovoid_picture_options_init(ovoid_picture_options *options, size_t size) {
     ov_sized_init(options, size, &defaults, sizeof defaults);
 }
 
-/* One field: its terms in the world and as the camera sees them, its boxes, what rays meet. */
+/* One field: its terms in the world (the field's own) and as the camera sees them, what rays meet.
+ */
 typedef struct scene {
-    ov_quadric *quadrics, *seen;
+    const ov_quadric *quadrics;
+    ov_quadric *seen;
     size_t count;
     ov_hits hits;
     bool traced;
@@ -69,7 +69,7 @@ typedef struct painter {
 
 /* ---- what is asked ------------------------------------------------------------------------ */
 
-static bool needs_molecule(ovoid_view view) {
+static bool needs_original(ovoid_view view) {
     return view == OVOID_VIEW_ORIGINAL || view == OVOID_VIEW_OVERLAY ||
            view == OVOID_VIEW_DIFFERENCE || view == OVOID_VIEW_PANEL;
 }
@@ -95,16 +95,16 @@ static ovoid_status check_numbers(ovoid_context *context, const ovoid_picture_op
     return OVOID_OK;
 }
 
-static ovoid_status check(ovoid_context *context, const ovoid_molecule *molecule, double decay,
-                          const ovoid_model *model, const ovoid_picture_options *options) {
+static ovoid_status check(ovoid_context *context, const ovoid_field *original,
+                          const ovoid_field *model, const ovoid_picture_options *options) {
     if ((unsigned)options->view > OVOID_VIEW_PANEL)
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "there is no view %d", (int)options->view);
-    if (needs_molecule(options->view) && !molecule)
+    if (needs_original(options->view) && !original)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_render: molecule is NULL: this view needs a molecule");
+                       "ovoid_render: original is NULL: this view needs the original's field");
     if (needs_model(options->view) && !model)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "ovoid_render: model is NULL: this view needs a model");
+                       "ovoid_render: model is NULL: this view needs the model's field");
     const uint32_t least = options->view == OVOID_VIEW_PANEL ? PANEL : 1;
     if (options->width < least || options->height < 1 || options->width > OVOID_PICTURE_SIDE_MAX ||
         options->height > OVOID_PICTURE_SIDE_MAX)
@@ -116,39 +116,21 @@ static ovoid_status check(ovoid_context *context, const ovoid_molecule *molecule
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "%u rays across a pixel are not within 1 to %d", (unsigned)options->samples,
                        OVOID_PICTURE_SAMPLES_MAX);
-    if (molecule && !(decay > 0.0 && decay <= 100.0))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
-                       decay);
     return check_numbers(context, options);
 }
 
 /* ---- the scene ---------------------------------------------------------------------------- */
 
-static ovoid_status make_scene(ovoid_context *context, size_t count, scene *s) {
-    s->quadrics = ov_alloc(context, count, sizeof *s->quadrics, "a picture's terms");
-    s->seen = ov_alloc(context, count, sizeof *s->seen, "a picture's terms");
-    s->count = count;
-    return s->quadrics && s->seen ? OVOID_OK : OVOID_ERROR_MEMORY;
-}
-
-static ovoid_status load_scenes(painter *p, const ovoid_molecule *molecule, double decay,
-                                const ovoid_model *model) {
-    ovoid_status status = OVOID_OK;
-    if (molecule) {
-        const double *const xyzr = ovoid_molecule_xyzr(molecule);
-        const size_t atoms = ovoid_molecule_atoms(molecule);
-        OV_TRY(ov_atoms_check(p->context, xyzr, atoms, decay));
-        OV_TRY(make_scene(p->context, atoms, &p->original));
-        for (size_t i = 0; i < atoms; ++i)
-            ov_quadric_of_atom(xyzr + 4 * i, decay, &p->original.quadrics[i]);
-    }
-    if (model) {
-        OV_TRY(make_scene(p->context, model->count, &p->model));
-        for (size_t i = 0; i < model->count; ++i)
-            ov_quadric_of_ellipsoid(&model->ellipsoids[i], &p->model.quadrics[i]);
-    }
-cleanup:
-    return status;
+static ovoid_status make_scene(ovoid_context *context, const ovoid_field *field, scene *s) {
+    if (!field)
+        return OVOID_OK;
+    const ovoid_status status = ov_field_check(context, field);
+    if (status != OVOID_OK)
+        return status;
+    s->quadrics = field->quadrics;
+    s->count = field->count;
+    s->seen = ov_alloc(context, field->count, sizeof *s->seen, "a picture's terms");
+    return s->seen ? OVOID_OK : OVOID_ERROR_MEMORY;
 }
 
 static void see(const ov_camera *camera, scene *s) {
@@ -503,7 +485,6 @@ cleanup:
 }
 
 static void destroy_scene(scene *s) {
-    free(s->quadrics);
     free(s->seen);
     ov_hits_destroy(&s->hits);
 }
@@ -518,17 +499,18 @@ static void destroy_painter(painter *p) {
         ov_buffer_destroy(buffers[k]);
 }
 
-ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule, double decay,
-                          const ovoid_model *model, const ovoid_picture_options *options,
-                          ovoid_image **image) {
+ovoid_status ovoid_render(ovoid_context *context, ovoid_field *original, ovoid_field *model,
+                          const ovoid_picture_options *options, ovoid_image **image) {
     OV_NEED(context, context);
     OV_NEED(context, options);
     OV_NEED(context, image);
     ovoid_picture_options o;
     ovoid_picture_options_init(&o, sizeof o);
     ovoid_status status = OV_SIZED_TAKE(context, ovoid_picture_options, options, &o);
+    if (o.isovalue == 0.0)
+        o.isovalue = ovoid_field_isovalue(original ? original : model);
     if (status == OVOID_OK)
-        status = check(context, molecule, decay, model, &o);
+        status = check(context, original, model, &o);
     if (status != OVOID_OK)
         return status;
     painter p = {.context = context, .options = &o};
@@ -537,7 +519,8 @@ ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule
     const bool panel = o.view == OVOID_VIEW_PANEL;
     ov_palette_diverging(p.diverging);
     ov_palette_distinct(p.distinct);
-    OV_TRY(load_scenes(&p, molecule, decay, model));
+    OV_TRY(make_scene(context, original, &p.original));
+    OV_TRY(make_scene(context, model, &p.model));
     place_camera(&p);
     OV_TRY(ov_image_make(context, o.width, o.height, &made));
     if (panel)

@@ -3,8 +3,7 @@
 #include "base/file.h"
 #include "base/progress.h"
 #include "base/sized.h"
-#include "field/field.h"
-#include "model/ellipsoid.h"
+#include "model/fields.h"
 #include "write/text.h"
 
 #include <math.h>
@@ -156,88 +155,43 @@ static ovoid_status check_size(ovoid_context *context, const ov_map *map, int by
                    (long)map->size[2], gigabytes, max_gigabytes);
 }
 
-/* The map of these quadrics. */
 static ovoid_status write_map(ovoid_context *context, const char *path, const format *chosen,
                               const ovoid_export_options *options, double isovalue,
-                              const ov_quadric *quadrics, size_t count, const char *label) {
-    ov_map map = {.quadrics = quadrics, .count = count, .spacing = options->spacing};
-    snprintf(map.label, sizeof map.label, "%s", label);
+                              ovoid_field *field) {
+    ov_map map = {.quadrics = field->quadrics, .count = field->count, .spacing = options->spacing};
+    if (field->model)
+        snprintf(map.label, sizeof map.label, "field of %zu ellipsoids, isovalue %.6g",
+                 field->count, field->isovalue);
+    else
+        snprintf(map.label, sizeof map.label, "field of %zu atoms, decay %.6g per square angstrom",
+                 field->count, field->decay);
     ovoid_status status = ov_map_cover(context, &map, isovalue);
     if (status == OVOID_OK)
         status = check_size(context, &map, chosen->bytes, options->max_gigabytes);
+    if (status == OVOID_OK)
+        status = ov_field_load(context, field, &map.evaluator);
     return status == OVOID_OK ? write_file(context, path, chosen, NULL, NULL, &map) : status;
 }
 
-static ovoid_status export_model_map(ovoid_context *context, const ovoid_model *model,
-                                     const char *path, const format *chosen,
-                                     const ovoid_export_options *options, double isovalue) {
-    const size_t count = ovoid_model_size(model);
-    char label[80];
-    ov_quadric *quadrics = ov_alloc(context, count, sizeof *quadrics, "ellipsoids");
-    if (!quadrics)
-        return OVOID_ERROR_MEMORY;
-    for (size_t i = 0; i < count; i++)
-        ov_quadric_of_ellipsoid(&ovoid_model_ellipsoids(model)[i], &quadrics[i]);
-    snprintf(label, sizeof label, "field of %zu ellipsoids, isovalue %.6g", count,
-             ovoid_model_isovalue(model));
-    ovoid_status status =
-        write_map(context, path, chosen, options, isovalue, quadrics, count, label);
-    free(quadrics);
-    return status;
-}
-
-ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model, const char *path,
+ovoid_status ovoid_field_export(ovoid_context *context, ovoid_field *field, const char *path,
                                 const ovoid_export_options *options) {
     OV_NEED(context, context);
-    OV_NEED(context, model);
+    OV_NEED(context, field);
     OV_NEED(context, path);
     ovoid_export_options o;
     const format *chosen;
-    ovoid_status status = take_options(context, options, &o);
+    ovoid_status status = ov_field_check(context, field);
     if (status == OVOID_OK)
-        status = choose_format(context, path, &o, true, &chosen);
+        status = take_options(context, options, &o);
+    if (status == OVOID_OK)
+        status = choose_format(context, path, &o, field->model != NULL, &chosen);
     if (status != OVOID_OK)
         return status;
-    const double isovalue = o.isovalue > 0.0 ? o.isovalue : ovoid_model_isovalue(model);
+    const double isovalue = o.isovalue > 0.0 ? o.isovalue : field->isovalue;
     if (chosen->map)
-        return export_model_map(context, model, path, chosen, &o, isovalue);
+        return write_map(context, path, chosen, &o, isovalue, field);
     ov_drawing drawing = {.isovalue = isovalue, .opacity = o.opacity};
     memcpy(drawing.colour, o.colour, sizeof drawing.colour);
     ov_title(path, drawing.title, sizeof drawing.title);
-    return write_file(context, path, chosen, model, &drawing, NULL);
-}
-
-ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
-                                   double decay, const char *path,
-                                   const ovoid_export_options *options) {
-    OV_NEED(context, context);
-    OV_NEED(context, molecule);
-    OV_NEED(context, path);
-    if (!(decay > 0.0 && decay <= 100.0))
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay %g is not above 0 and at most 100",
-                       decay);
-    const size_t atoms = ovoid_molecule_atoms(molecule);
-    const double *xyzr = ovoid_molecule_xyzr(molecule);
-    ov_quadric *quadrics = NULL;
-    ovoid_status status = OVOID_OK;
-    ovoid_export_options o;
-    const format *chosen;
-    char label[80];
-    OV_TRY(take_options(context, options, &o));
-    OV_TRY(choose_format(context, path, &o, false, &chosen));
-    OV_TRY(ov_atoms_check(context, xyzr, atoms, decay));
-    quadrics = ov_alloc(context, atoms, sizeof *quadrics, "atoms");
-    if (!quadrics)
-        OV_TRY(OVOID_ERROR_MEMORY);
-    for (size_t i = 0; i < atoms; i++)
-        ov_quadric_of_atom(xyzr + 4 * i, decay, &quadrics[i]);
-    snprintf(label, sizeof label, "field of %zu atoms, decay %.6g per square angstrom", atoms,
-             decay);
-    status =
-        write_map(context, path, chosen, &o, o.isovalue > 0.0 ? o.isovalue : OVOID_DEFAULT_ISOVALUE,
-                  quadrics, atoms, label);
-
-cleanup:
-    free(quadrics);
-    return status;
+    return write_file(context, path, chosen, field->model, &drawing, NULL);
 }

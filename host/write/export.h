@@ -55,8 +55,9 @@ ovoid_status ov_write_json(ovoid_context *context, const ovoid_model *model,
 typedef struct ov_map {
     const ov_quadric *quadrics; /* not owned */
     size_t count;
-    double spacing;   /* angstrom */
-    int32_t start[3]; /* x, y, z */
+    struct ov_evaluator *evaluator; /* of the quadrics; not owned */
+    double spacing;                 /* angstrom */
+    int32_t start[3];               /* x, y, z */
     int32_t size[3];
     char label[80]; /* what field it is */
 } ov_map;

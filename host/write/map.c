@@ -71,14 +71,12 @@ ovoid_status ov_map_run(ovoid_context *context, const ov_map *map, const int fas
     const size_t piece = total < PIECE ? (size_t)total : PIECE;
     double *xyz = ov_alloc(context, 3 * piece, sizeof *xyz, "a map's points");
     float *values = ov_alloc(context, piece, sizeof *values, "a map's values");
-    ov_evaluator evaluator = {0};
     if (!xyz || !values)
         OV_TRY(OVOID_ERROR_MEMORY);
-    OV_TRY(ov_evaluator_create(context, map->quadrics, map->count, &evaluator));
     for (uint64_t first = 0; first < total && !ferror(stream); first += piece) {
         const size_t count = total - first < piece ? (size_t)(total - first) : piece;
         place_points(map, fast, first, count, xyz);
-        OV_TRY(ov_evaluator_run(context, &evaluator, xyz, count, values, NULL));
+        OV_TRY(ov_evaluator_run(context, map->evaluator, xyz, count, values, NULL));
         for (size_t k = 0, some; k < count && !ferror(stream); k += some) {
             some = count - k < SLICE ? count - k : SLICE;
             sink(values + k, some, user);
@@ -87,7 +85,6 @@ ovoid_status ov_map_run(ovoid_context *context, const ov_map *map, const int fas
     }
 
 cleanup:
-    ov_evaluator_destroy(&evaluator);
     free(xyz);
     free(values);
     return status;

@@ -45,16 +45,11 @@ OVOID_API void ovoid_export_options_init(ovoid_export_options *options, size_t s
 
 /* Writes a file for another program, whole or not at all; "-" is standard output and needs a
  * format. options may be NULL. OVOID_ERROR_ARGUMENT where the path's extension stands for another
- * format than the options name. A map is computed on the device and written piece by piece: memory
- * does not grow with it; OVOID_ERROR_LIMIT, before anything is computed, where it would take more
- * than max_gigabytes. */
-OVOID_API ovoid_status ovoid_model_export(ovoid_context *context, const ovoid_model *model,
+ * format than the options name, and for ellipsoids of a molecule, which has none. A map is computed
+ * on the device and written piece by piece: memory does not grow with it; OVOID_ERROR_LIMIT, before
+ * anything is computed, where it would take more than max_gigabytes. */
+OVOID_API ovoid_status ovoid_field_export(ovoid_context *context, ovoid_field *field,
                                           const char *path, const ovoid_export_options *options);
-
-/* As ovoid_model_export(), for the field of a molecule: maps alone. */
-OVOID_API ovoid_status ovoid_molecule_export(ovoid_context *context, const ovoid_molecule *molecule,
-                                             double decay, const char *path,
-                                             const ovoid_export_options *options);
 
 /* Name of a format as ovoid_export_format_find() takes it, "bild" for example; NULL for others. */
 OVOID_API const char *ovoid_export_format_name(ovoid_export_format format);

@@ -23,8 +23,9 @@ extern "C" {
 
 /* Keeps what fits of one molecule share: the constrained points and what a model is held to there,
  * the mesh of the original surface that models are judged by, how the atoms merge, and buffers on
- * the device; for method adaptive about as much memory as a fit has at its peak, and 200 bytes for
- * each atom. Belongs to its context and to the device that is open when it first fits. */
+ * the device. It belongs to the context that it was made with, and is refused by others. When that
+ * one opens another device, the fitter follows, and prepares anew; when it is destroyed first, the
+ * fitter can only be destroyed. */
 typedef struct ovoid_fitter ovoid_fitter;
 
 /* Makes a fitter for the molecule's atoms (copied) and the surface that the options define: decay,

@@ -18,8 +18,8 @@ typedef struct ovoid_pair { /* 24 bytes */
 
 typedef struct ovoid_measure_options {
     size_t size;
-    double isovalue;
-    double spacing; /* of both meshes, angstrom */
+    double isovalue; /* of both surfaces; 0: that of the original's field */
+    double spacing;  /* of both meshes, angstrom */
     ovoid_vertex_rule vertices;
     bool distances; /* also compute distances */
 } ovoid_measure_options;
@@ -41,16 +41,17 @@ typedef struct ovoid_measures {
     double seconds_mesh, seconds_distances;
 } ovoid_measures;
 
-/* isovalue 1, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices, with distances; size is sizeof
+/* isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices, with distances; size is sizeof
  * *options. */
 OVOID_API void ovoid_measure_options_init(ovoid_measure_options *options, size_t size);
 
 /* Nothing known; size is sizeof *measures. */
 OVOID_API void ovoid_measures_init(ovoid_measures *measures, size_t size);
 
-/* Meshes both surfaces on the same lattice and compares them. decay is that of the model. */
-OVOID_API ovoid_status ovoid_measure(ovoid_context *context, const ovoid_molecule *molecule,
-                                     const ovoid_model *model, const ovoid_measure_options *options,
+/* Meshes both surfaces on the same lattice and compares them; measures was made by
+ * ovoid_measures_init(). */
+OVOID_API ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original,
+                                     ovoid_field *sparse, const ovoid_measure_options *options,
                                      ovoid_measures *measures);
 
 #ifdef __cplusplus

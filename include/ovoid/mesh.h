@@ -27,12 +27,12 @@ typedef enum ovoid_vertex_rule {
 
 typedef struct ovoid_mesh_options {
     size_t size;
-    double isovalue; /* c */
+    double isovalue; /* c; 0: the field's */
     double spacing;  /* of the marching-cubes lattice, angstrom */
     ovoid_vertex_rule vertices;
 } ovoid_mesh_options;
 
-/* isovalue 1, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices; size is sizeof *options. */
+/* isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices; size is sizeof *options. */
 OVOID_API void ovoid_mesh_options_init(ovoid_mesh_options *options, size_t size);
 
 /* Marching cubes on the device over the lattice of multiples of `spacing` that covers the surface;
@@ -41,11 +41,8 @@ OVOID_API void ovoid_mesh_options_init(ovoid_mesh_options *options, size_t size)
  * last one halved; a warning counts what is smaller than a thousandth of the spacing. Time and
  * memory follow the surface, not the box. OVOID_ERROR_EMPTY when the field is nowhere above the
  * isovalue on the lattice, OVOID_ERROR_LIMIT when that would have more than 2e10 points and 1e5
- * for each atom or ellipsoid, or more than 1e12 values of Gaussians at them and 1e6 for each. */
-OVOID_API ovoid_status ovoid_molecule_mesh(ovoid_context *context, const ovoid_molecule *molecule,
-                                           double decay, const ovoid_mesh_options *options,
-                                           ovoid_mesh **mesh);
-OVOID_API ovoid_status ovoid_model_mesh(ovoid_context *context, const ovoid_model *model,
+ * for each Gaussian, or more than 1e12 values of Gaussians at them and 1e6 for each. */
+OVOID_API ovoid_status ovoid_field_mesh(ovoid_context *context, ovoid_field *field,
                                         const ovoid_mesh_options *options, ovoid_mesh **mesh);
 
 /* Makes a mesh from arrays (copied): xyz and normals 3 * vertices (normals may be NULL: taken from

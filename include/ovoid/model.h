@@ -69,11 +69,6 @@ OVOID_API ovoid_status ovoid_model_read(ovoid_context *context, const char *path
 OVOID_API ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model,
                                          const char *path);
 
-/* As ovoid_molecule_field(), for the model's field. */
-OVOID_API ovoid_status ovoid_model_field(ovoid_context *context, const ovoid_model *model,
-                                         const double *xyz, size_t count, double *value,
-                                         double *gradient);
-
 #ifdef __cplusplus
 }
 #endif

@@ -32,7 +32,7 @@ typedef struct ovoid_picture_options {
     uint32_t width, height; /* pixels, 1 .. OVOID_PICTURE_SIDE_MAX; of the whole panel */
     uint32_t samples;       /* rays across a pixel, 1 .. OVOID_PICTURE_SAMPLES_MAX: a pixel is the
                                mean of samples^2 rays */
-    double isovalue;        /* c */
+    double isovalue;        /* c; 0: that of the original, or of the model where there is none */
     double direction[3];    /* from the molecule to the eye; 0, 0, 0: along the least principal axis
                                of the atoms' centres. The longest one lies across the longer side. */
     double rotation[3]; /* about the screen's x (right), y (up), z (to the eye), radian: turns the
@@ -49,21 +49,22 @@ typedef struct ovoid_picture_options {
                             what is seen */
 } ovoid_picture_options;
 
-/* OVOID_VIEW_ORIGINAL, 1200 by 900 pixels of 3^2 rays, isovalue 1, default direction, fit to size,
+/* OVOID_VIEW_ORIGINAL, 1200 by 900 pixels of 3^2 rays, isovalue 0, default direction, fit to size,
  * a white background, centres and colour bar shown; size is sizeof *options. */
 OVOID_API void ovoid_picture_options_init(ovoid_picture_options *options, size_t size);
 
 typedef struct ovoid_image ovoid_image;
 
-/* Takes a picture on the device: orthographic, shaded, with ambient occlusion and depth fading. The
- * view decides which of molecule and model are needed; the other may be NULL. decay is that of the
- * molecule's surface. The same input, options, device and driver give the same bytes.
+/* Takes a picture on the device: orthographic, shaded, with ambient occlusion and depth fading.
+ * original is the field of the molecule, as a rule, and model that of the model; the view decides
+ * which of the two are needed, and the other may be NULL. The same input, options, device and
+ * driver give the same bytes.
  *
  * A surface that is out of sight or does not exist (the isovalue is above the field's maximum) is
  * no error: the picture shows the background, and ovoid_image_covered() is 0. */
-OVOID_API ovoid_status ovoid_render(ovoid_context *context, const ovoid_molecule *molecule,
-                                    double decay, const ovoid_model *model,
-                                    const ovoid_picture_options *options, ovoid_image **image);
+OVOID_API ovoid_status ovoid_render(ovoid_context *context, ovoid_field *original,
+                                    ovoid_field *model, const ovoid_picture_options *options,
+                                    ovoid_image **image);
 
 /* Makes an image of pixels (copied): 4 * width * height bytes as ovoid_image_pixels(). */
 OVOID_API ovoid_status ovoid_image_create(ovoid_context *context, uint32_t width, uint32_t height,

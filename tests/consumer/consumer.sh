@@ -1,7 +1,8 @@
 #!/bin/sh
 # consumer.sh KIND WAY PREFIX
-# Builds consumer.c with the library installed below PREFIX, shared or static (KIND), found by CMake
-# or by pkg-config (WAY: cmake or pkgconfig), and fits a molecule with it. Environment: CMAKE,
+# Builds three programs with the library installed below PREFIX, shared or static (KIND), found by
+# CMake or by pkg-config (WAY: cmake or pkgconfig): consumer.c fits a molecule, fields.c makes a field
+# once and works with it, opencl.c has an OpenCL context of its own. Environment: CMAKE,
 # CMAKE_GENERATOR, CC.
 set -eu
 kind=$1
@@ -15,14 +16,16 @@ libdir=$(dirname "$(find "$prefix" -name 'libovoid.*' | head -n 1)")
 if [ "$way" = cmake ]; then
     "$CMAKE" -S "$sources" -B "$work/build" -DCMAKE_PREFIX_PATH="$prefix"
     "$CMAKE" --build "$work/build"
-    consumer=$work/build/consumer
+    programs=$work/build
 else
     export PKG_CONFIG_PATH="$libdir/pkgconfig"
     option=
     [ "$kind" = shared ] || option=--static
-    consumer=$work/consumer
-    "$CC" -Wall -Wextra -Werror "$sources/consumer.c" -o "$consumer" \
-        $(pkg-config $option --cflags --libs ovoid)
+    programs=$work
+    for name in consumer fields opencl; do
+        "$CC" -Wall -Wextra -Werror "$sources/$name.c" -o "$programs/$name" \
+            $(pkg-config $option --cflags --libs ovoid OpenCL) -lm
+    done
 fi
 
 # Hydrogen fluoride and a carbon atom beside it.
@@ -31,7 +34,10 @@ cat >"$work/molecule.xyzr" <<'END'
 0.92 0.00 0.00 1.20
 2.10 1.40 0.30 1.70
 END
-LD_LIBRARY_PATH="$libdir" "$consumer" "$work/molecule.xyzr" "$work/model.ovoid"
+export LD_LIBRARY_PATH="$libdir"
+"$programs/fields" "$work/molecule.xyzr"
+"$programs/opencl" "$work/molecule.xyzr"
+"$programs/consumer" "$work/molecule.xyzr" "$work/model.ovoid"
 count=$(grep -vc '^#' "$work/model.ovoid")
 if [ "$count" -lt 1 ] || [ "$count" -gt 3 ]; then
     echo "The model has $count ellipsoids."

@@ -18,7 +18,7 @@ rm -rf "$folder" "$folder.first"
 "$CMAKE" --install "$build" --prefix "$folder.first"
 mv "$folder.first" "$folder"
 
-for pattern in include/ovoid/ovoid.h bin/ovoid 'lib*/cmake/ovoid/ovoidConfig.cmake' \
+for pattern in include/ovoid/ovoid.h include/ovoid/opencl.h bin/ovoid 'lib*/cmake/ovoid/ovoidConfig.cmake' \
     'lib*/cmake/ovoid/ovoidConfigVersion.cmake' share/doc/ovoid/LICENSE share/man/man1/ovoid.1 \
     share/man/man1/ovoid-fit.1 share/bash-completion/completions/ovoid; do
     find "$folder" -path "$folder/$pattern" | grep -q . || { echo "$pattern is missing"; exit 1; }

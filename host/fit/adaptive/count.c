@@ -26,6 +26,7 @@ static ovoid_status repair_once(ov_adaptive *f, const ov_trial *from, size_t ski
         ov_merge_cheapest(&f->refiner, &f->merger, &f->target, to->x, &to->count, more, &merging));
     OV_TRY(
         ov_owner_merge(f->context, f->parents, to->count, split, to->owner, f->atoms, to->owner));
+    OV_TRY(ov_adaptive_sort(f, to));
     OV_TRY(ov_adaptive_refine_fully(f, to, "repair"));
     OV_TRY(ov_adaptive_judge(f, to));
 cleanup:

@@ -104,6 +104,7 @@ static ovoid_status act(ov_adaptive *f, const char *stage, ov_trial *t, const ov
     choose(f, t, spots, 0, UINT32_MAX, REFINED, g);
     OV_TRY(ov_adaptive_refine_some(f, t, stage, OV_LOCAL_STEPS, g->chosen));
     OV_TRY(ov_adaptive_share_atoms(f, t));
+    OV_TRY(ov_adaptive_sort(f, t));
 cleanup:
     return status;
 }

@@ -158,6 +158,7 @@ ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial
     for (size_t i = 0; i < count; ++i)
         ov_factor_of_quadric(&f->quadrics[i], t->x + i * OV_FACTOR_PARAMETERS);
     t->count = count;
+    OV_TRY(ov_adaptive_sort(f, t));
     f->count = count;
     f->misfit = 0.0;
     if (!ov_adaptive_report(f))

@@ -86,6 +86,11 @@ ovoid_status ov_adaptive_refine_some(ov_adaptive *f, ov_trial *t, const char *st
  * that was split between it and its f->twin. */
 ovoid_status ov_adaptive_share_atoms(ov_adaptive *f, ov_trial *t);
 
+/* Puts the ellipsoids in the order of a space-filling curve, so that those that are near each other
+ * are so in memory, too; owners follow. What else goes by place, such as twins and parents, does
+ * not. Merging leaves them in no order, and splits append. */
+ovoid_status ov_adaptive_sort(ov_adaptive *f, ov_trial *t);
+
 ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t);
 
 /* The merged atoms of start `kind` at this count. */

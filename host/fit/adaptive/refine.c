@@ -65,9 +65,10 @@ static ovoid_status set_terms(ov_refiner *r, ov_evaluation *e, const ov_points *
                               OV_REFINE_CUTOFF);
 }
 
-/* Sets the terms, and builds the lists again if they do not cover them any more. */
+/* Sets the terms, and begins to build the lists again if they do not cover them any more: *begun.
+ */
 static ovoid_status place(ov_refiner *r, ov_evaluation *e, const ov_points *points, const double *x,
-                          size_t count) {
+                          size_t count, bool *begun) {
     ovoid_status status = OVOID_OK;
     const size_t size = count * OV_FACTOR_PARAMETERS;
     const bool covered = lists_cover(e, points, x, count);
@@ -80,11 +81,14 @@ static ovoid_status place(ov_refiner *r, ov_evaluation *e, const ov_points *poin
     OV_TRY(set_terms(r, e, points, x, count));
     if (covered)
         return OVOID_OK;
-    OV_TRY(ov_lists_build(r->context, &e->lists, points, &e->terms, 0.0));
+    *begun = ov_lists_built(&e->lists);
+    OV_TRY(*begun ? ov_lists_begin(r->context, &e->lists, points, &e->terms, 0.0)
+                  : ov_lists_build(r->context, &e->lists, points, &e->terms, 0.0));
     memcpy(e->listed, x, size * sizeof *x);
-    e->listed_count = count;
     e->listed_points = points;
     ++r->list_builds;
+    if (!*begun)
+        e->listed_count = count;
 cleanup:
     return status;
 }
@@ -115,14 +119,12 @@ cleanup:
     return status;
 }
 
-static ovoid_status evaluate(ov_refiner *r, ov_evaluation *e, const ov_target *target,
-                             const double *x, size_t count, double *misfit) {
+/* The misfit with the lists as they are. */
+static ovoid_status sum_misfit(ov_refiner *r, ov_evaluation *e, const ov_target *target,
+                               double *misfit) {
     ovoid_status status = OVOID_OK;
-    const ov_points *const points = target->points;
-    const size_t sums = sums_of(points);
-    OV_TRY(make_room(r, count));
-    OV_TRY(place(r, e, points, x, count));
-    OV_TRY(ov_field(r->context, &r->operations, points, &e->terms, &e->lists, &e->value));
+    const size_t sums = sums_of(target->points);
+    OV_TRY(ov_field(r->context, &r->operations, target->points, &e->terms, &e->lists, &e->value));
     OV_TRY(launch_misfit(r, e, target));
     OV_TRY(
         ov_grow(r->context, &r->host, &r->host_capacity, sums, sizeof *r->host, "sums of packs"));
@@ -130,8 +132,29 @@ static ovoid_status evaluate(ov_refiner *r, ov_evaluation *e, const ov_target *t
     *misfit = 0.0;
     for (size_t k = 0; k < sums; ++k)
         *misfit += r->host[k];
+cleanup:
+    return status;
+}
+
+static ovoid_status evaluate(ov_refiner *r, ov_evaluation *e, const ov_target *target,
+                             const double *x, size_t count, double *misfit) {
+    ovoid_status status = OVOID_OK;
+    bool begun = false, whole = true;
+    OV_TRY(make_room(r, count));
+    OV_TRY(place(r, e, target->points, x, count, &begun));
+    OV_TRY(sum_misfit(r, e, target, misfit));
+    if (begun) {
+        OV_TRY(ov_lists_end(r->context, &e->lists, &whole));
+        if (!whole) { /* there were more pairs than ever before */
+            OV_TRY(ov_lists_build(r->context, &e->lists, target->points, &e->terms, 0.0));
+            OV_TRY(sum_misfit(r, e, target, misfit));
+        }
+        e->listed_count = count;
+    }
     ++r->evaluations;
 cleanup:
+    if (begun && status != OVOID_OK)
+        ov_later_end(r->context, &e->lists.later);
     return status;
 }
 

@@ -52,8 +52,11 @@ static ovoid_status upload_factors(ovoid_context *context, ov_solver *s, const d
 
 /* ---- looks at the residual ------------------------------------------------------------------ */
 
-/* The residual is read while the device goes on, and looked at an iteration later: it costs one
- * iteration too many instead of a wait in each. */
+/* The residual is read while the device goes on, and looked at an iteration later: that costs an
+ * iteration too many, but no wait. A look is begun after each fourth iteration but one, so that
+ * four or a multiple of it are done. */
+#define LOOK_EVERY 4
+
 typedef struct look {
     ov_later later;
     float *partial; /* room for the sums of all groups */
@@ -67,7 +70,10 @@ static ovoid_status begin_look(ovoid_context *context, const ov_buffer *sums, si
                                 &l->later);
 }
 
+/* The sum stays where no look was begun. */
 static ovoid_status end_look(ovoid_context *context, look *l, double *sum) {
+    if (!l->later.event)
+        return OVOID_OK;
     const ovoid_status status = ov_later_end(context, &l->later);
     *sum = 0.0;
     for (size_t k = 0; status == OVOID_OK && k < l->groups; ++k)
@@ -146,35 +152,39 @@ cleanup:
     return status;
 }
 
+/* What looks are under way write to s->host: they end before others do. */
+static ovoid_status end_both(ovoid_context *context, look *first, look *later,
+                             ovoid_status status) {
+    const ovoid_status one = ov_later_end(context, &first->later);
+    const ovoid_status other = ov_later_end(context, &later->later);
+    return status != OVOID_OK ? status : one != OVOID_OK ? one : other;
+}
+
 /* *still: there is nothing to solve, and x is no solution. */
 static ovoid_status iterate(work *w, uint32_t iterations, double tolerance, bool *still) {
     ovoid_status status = OVOID_OK;
     ov_solver *const s = w->s;
-    double start = 0.0, now;
-    look looks[2] = {{.partial = s->host}, {.partial = s->host + groups_of(s, w->count)}};
+    double start = 0.0, now = 0.0;
+    look first = {.partial = s->host}, later = {.partial = s->host + groups_of(s, w->count)};
     *still = false;
     if (iterations > 0)
-        OV_TRY(begin_look(w->context, &s->rz, w->groups, &looks[0]));
+        OV_TRY(begin_look(w->context, &s->rz, w->groups, &first));
     for (uint32_t k = 1; k <= iterations; ++k) {
         OV_TRY(iteration(w));
-        if (k < iterations)
-            OV_TRY(begin_look(w->context, &s->rz, w->groups, &looks[k % 2]));
-        OV_TRY(end_look(w->context, &looks[(k - 1) % 2], &now));
-        if (k == 1)
-            start = now;
+        OV_TRY(end_look(w->context, &first, &start));
+        now = k == 1 ? start : now;
+        OV_TRY(end_look(w->context, &later, &now));
         *still = !(start > 0.0);
         if (*still)
             break;
         ++s->iterations;
         if (!(now > tolerance * tolerance * start))
             break;
+        if (k % LOOK_EVERY == LOOK_EVERY - 1)
+            OV_TRY(begin_look(w->context, &s->rz, w->groups, &later));
     }
 cleanup:
-    for (int k = 0; k < 2; ++k) { /* they write to s->host */
-        const ovoid_status ended = ov_later_end(w->context, &looks[k].later);
-        status = status != OVOID_OK ? status : ended;
-    }
-    return status;
+    return end_both(w->context, &first, &later, status);
 }
 
 ovoid_status ov_solve(ovoid_context *context, ov_solver *s, ov_operations *operations,

@@ -1,0 +1,150 @@
+#include "measure/facets.h"
+
+#include "field/field.h"
+
+#include <float.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BOX 6 /* floats: low x, y, z, high x, y, z */
+
+void ov_facets_round(const ov_facets *facets, const ovoid_mesh *mesh, const uint32_t *vertex,
+                     size_t first, size_t count, float *xyz) {
+    for (size_t k = 0; k < count; ++k) {
+        double at[3];
+        ov_mesh_at(mesh, vertex ? vertex[first + k] : first + k, at);
+        for (size_t axis = 0; axis < 3; ++axis)
+            xyz[3 * k + axis] = (float)(at[axis] - facets->origin[axis]);
+    }
+}
+
+/* Vertices are rounded so many at a time, so that the host holds few of them twice. */
+#define PIECE_VERTICES ((size_t)1 << 16)
+
+static ovoid_status load_vertices(ovoid_context *context, ov_facets *facets) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_mesh *const mesh = facets->trail.mesh;
+    const size_t each = 3 * sizeof(float);
+    float *xyz = NULL;
+    if (ov_mesh_is_about(mesh, facets->origin))
+        return ov_buffer_put(context, &facets->vertices, mesh->offsets, mesh->vertices * each,
+                             "vertices of a mesh");
+    OV_TRY(
+        ov_buffer_reserve(context, &facets->vertices, mesh->vertices * each, "vertices of a mesh"));
+    xyz = ov_alloc(context, PIECE_VERTICES, each, "vertices of a mesh");
+    if (!xyz)
+        OV_TRY(OVOID_ERROR_MEMORY);
+    for (size_t first = 0, count; first < mesh->vertices; first += count) {
+        count = mesh->vertices - first < PIECE_VERTICES ? mesh->vertices - first : PIECE_VERTICES;
+        OV_TRY(ov_progress_ask(context));
+        ov_facets_round(facets, mesh, NULL, first, count, xyz);
+        OV_TRY(ov_buffer_write(context, &facets->vertices, first * each, xyz, count * each));
+    }
+cleanup:
+    free(xyz);
+    return status;
+}
+
+/* The corners of the triangles from `first` to `end`, or of the first ones of so many leaves. */
+static ovoid_status list_corners(ovoid_context *context, ov_facets *facets, bool coarse,
+                                 size_t first, size_t end, const uint32_t **corners) {
+    const uint32_t *const all = facets->trail.mesh->corners;
+    *corners = all + 3 * first;
+    if (!coarse && !facets->trail.triangle)
+        return OVOID_OK;
+    const ovoid_status status =
+        ov_grow(context, &facets->listed, &facets->listed_capacity, 3 * (end - first),
+                sizeof *facets->listed, "triangles of a mesh");
+    for (size_t k = first; k < end && status == OVOID_OK; ++k) {
+        const size_t t = ov_trail_triangle(&facets->trail, coarse ? k * OV_LEAF : k);
+        memcpy(facets->listed + 3 * (k - first), all + 3 * t, 3 * sizeof *all);
+    }
+    *corners = facets->listed;
+    return status;
+}
+
+_Static_assert(OV_LEAF == OV_GROUP, "coarse leaves are groups of leaves");
+
+ovoid_status ov_facets_load(ovoid_context *context, ov_facets *facets, bool coarse, size_t first,
+                            size_t end) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
+    const uint32_t *corners;
+    const size_t total = coarse ? facets->leaves : facets->trail.triangles, from = first * OV_LEAF,
+                 to = end * OV_LEAF < total ? end * OV_LEAF : total;
+    const cl_uint leaves = (cl_uint)(end - first), triangles = (cl_uint)(to - from);
+    if (facets->first == first && facets->end == end && facets->coarse == coarse)
+        return OVOID_OK;
+    facets->first = facets->end = 0;
+    OV_TRY(ov_device_get(context, &device));
+    OV_TRY(list_corners(context, facets, coarse, from, to, &corners));
+    OV_TRY(ov_buffer_put(context, &facets->corners, corners, 3 * (to - from) * sizeof *corners,
+                         "triangles of a mesh"));
+    OV_TRY(ov_buffer_reserve(context, &facets->packed,
+                             (end - first) * OV_TRIANGLE * OV_LEAF * sizeof(cl_float),
+                             "triangles of a mesh"));
+    OV_TRY(ov_buffer_reserve(context, &facets->leaf_boxes, (end - first) * BOX * sizeof(cl_float),
+                             "boxes of triangles"));
+    OV_TRY(OV_LAUNCH(context, &facets->pack, leaves, ov_item_group(device), OV_ARG(leaves),
+                     OV_ARG(triangles), OV_ARG(facets->corners.memory),
+                     OV_ARG(facets->vertices.memory), OV_ARG(facets->packed.memory),
+                     OV_ARG(facets->leaf_boxes.memory)));
+    facets->first = first;
+    facets->end = end;
+    facets->coarse = coarse;
+cleanup:
+    return status;
+}
+
+/* The boxes of all leaves, chunk by chunk, and the tree over them. */
+static ovoid_status grow_tree(ovoid_context *context, ov_facets *facets) {
+    ovoid_status status = OVOID_OK;
+    const size_t leaves = facets->leaves, chunk = facets->chunk;
+    float *tree = NULL;
+    size_t floats = 0;
+    OV_TRY(ov_grow(context, &facets->box, &facets->box_capacity, leaves * BOX + 1,
+                   sizeof *facets->box, "boxes of triangles"));
+    for (size_t first = 0, end; first < leaves; first = end) {
+        end = leaves - first < chunk ? leaves : first + chunk;
+        OV_TRY(ov_facets_load(context, facets, false, first, end));
+        OV_TRY(ov_buffer_read(context, &facets->leaf_boxes, 0, facets->box + first * BOX,
+                              (end - first) * BOX * sizeof *facets->box));
+    }
+    OV_TRY(ov_tree_build(context, facets->box, leaves, &facets->tree, &tree, &floats));
+    OV_TRY(
+        ov_buffer_put(context, &facets->boxes, tree, floats * sizeof *tree, "boxes of triangles"));
+cleanup:
+    free(tree);
+    return status;
+}
+
+ovoid_status ov_facets_set(ovoid_context *context, ov_facets *facets, const ov_trail *trail,
+                           const double origin[3]) {
+    ovoid_status status = OVOID_OK;
+    facets->trail = *trail;
+    memcpy(facets->origin, origin, sizeof facets->origin);
+    facets->leaves = (trail->triangles + OV_LEAF - 1) / OV_LEAF;
+    facets->chunk = facets->chunk ? facets->chunk : OV_FACETS_CHUNK;
+    facets->first = facets->end = 0;
+    if (!facets->pack.handle)
+        OV_TRY(ov_kernel_create(context, "distance", "pack_leaves", &facets->pack));
+    OV_TRY(load_vertices(context, facets));
+    OV_TRY(grow_tree(context, facets));
+cleanup:
+    if (status != OVOID_OK) {
+        facets->trail = (ov_trail){0};
+        facets->leaves = 0;
+    }
+    return status;
+}
+
+void ov_facets_destroy(ov_facets *facets) {
+    ov_buffer *const buffers[] = {&facets->boxes, &facets->vertices, &facets->corners,
+                                  &facets->packed, &facets->leaf_boxes};
+    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+        ov_buffer_destroy(buffers[k]);
+    ov_kernel_destroy(&facets->pack);
+    free(facets->box);
+    free(facets->listed);
+    memset(facets, 0, sizeof *facets);
+}

@@ -326,6 +326,7 @@ static void starts_from_anywhere(void **state) {
     model = reach(*state, fitter, OVOID_GOAL_TOLERANCE, TOLERANCE, &result);
     expect_holds(*state, molecule, model, TOLERANCE);
     assert_true(result.ellipsoids <= first.ellipsoids);
+    assert_true(expect_owners(molecule, model, 3, 0.8) <= 3); /* they were found */
     ovoid_model_destroy(&model);
     ovoid_model_destroy(&start);
     ovoid_model_destroy(&alone);

@@ -549,7 +549,7 @@ static bool stop_there(const ovoid_progress *progress, void *user) {
     return !s->stopped;
 }
 
-static void a_stopped_fit_hands_over_nothing(void **state) {
+static void a_stopped_fit_hands_over_what_held(void **state) {
     test_skip_simulated(*state);
     ovoid_molecule *molecule = random_chain(*state, test_size(30, 4), 7);
     const struct {
@@ -576,8 +576,15 @@ static void a_stopped_fit_hands_over_nothing(void **state) {
         test_refused(*state, ovoid_fit(*state, molecule, &options, &model, &result),
                      OVOID_ERROR_CANCELLED, "stopped");
         ovoid_context_on_progress(*state, NULL, NULL);
-        assert_ptr_equal(model, nothing);
-        assert_memory_equal(&result, &untouched, sizeof result);
+        if (strcmp(s.stage, "sample") == 0 || strcmp(s.stage, "mesh") == 0)
+            assert_null(model);
+        if (strcmp(s.stage, "shrink") == 0 || strcmp(s.stage, "repair") == 0)
+            assert_non_null(model);
+        if (model)
+            assert_true(result.reached && result.ellipsoids == ovoid_model_size(model));
+        else
+            assert_memory_equal(&result, &untouched, sizeof result);
+        ovoid_model_destroy(&model);
     }
     ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, 2); /* fit for the next one */
     outcome o = fit(*state, molecule, &options);
@@ -679,7 +686,7 @@ int main(void) {
         cmocka_unit_test(a_rod_equals_its_integral),
         cmocka_unit_test(effort_helps),
         cmocka_unit_test(two_fits_give_the_same_bits),
-        cmocka_unit_test(a_stopped_fit_hands_over_nothing),
+        cmocka_unit_test(a_stopped_fit_hands_over_what_held),
         cmocka_unit_test(bad_options_are_named),
         cmocka_unit_test(impossible_molecules),
         cmocka_unit_test(atoms_far_apart),

@@ -221,6 +221,31 @@ static void files(void **state) {
     ovoid_file_destroy(&file);
 }
 
+static void fitters(const ovoid_fit_options *options) {
+    ovoid_context *const c = all.context;
+    ovoid_fitter *fitter = NULL;
+    ovoid_model *made = NULL;
+    const double xyz[3] = {0.0, 0.0, 0.0};
+    REFUSED(ovoid_fitter_create, context, NULL, all.molecule, options, &fitter);
+    REFUSED(ovoid_fitter_create, molecule, c, NULL, options, &fitter);
+    REFUSED(ovoid_fitter_create, options, c, all.molecule, NULL, &fitter);
+    REFUSED(ovoid_fitter_create, fitter, c, all.molecule, options, NULL);
+    test_check(c, ovoid_fitter_create(c, all.molecule, options, &fitter));
+    REFUSED(ovoid_fitter_reach, context, NULL, fitter, options, &made, NULL);
+    REFUSED(ovoid_fitter_reach, fitter, c, NULL, options, &made, NULL);
+    REFUSED(ovoid_fitter_reach, options, c, fitter, NULL, &made, NULL);
+    REFUSED(ovoid_fitter_reach, model, c, fitter, options, NULL, NULL);
+    REFUSED(ovoid_fitter_start_from, context, NULL, fitter, all.model);
+    REFUSED(ovoid_fitter_start_from, fitter, c, NULL, all.model);
+    test_check(c, ovoid_fitter_start_from(c, fitter, NULL)); /* the atoms */
+    REFUSED(ovoid_fitter_move, context, NULL, fitter, xyz);
+    REFUSED(ovoid_fitter_move, fitter, c, NULL, xyz);
+    REFUSED(ovoid_fitter_move, xyz, c, fitter, NULL);
+    ovoid_fitter_destroy(&fitter);
+    DOES_NOTHING(ovoid_fitter_destroy, &fitter);
+    DOES_NOTHING(ovoid_fitter_destroy, NULL);
+}
+
 static void fields_and_models(void **state) {
     (void)state;
     ovoid_context *const c = all.context;
@@ -262,6 +287,7 @@ static void fields_and_models(void **state) {
     REFUSED(ovoid_model_write, context, NULL, all.model, "/dev/null");
     REFUSED(ovoid_model_write, model, c, NULL, "/dev/null");
     REFUSED(ovoid_model_write, path, c, all.model, NULL);
+    fitters(&options);
     REFUSED(ovoid_fit, context, NULL, all.molecule, &options, &made, NULL);
     REFUSED(ovoid_fit, molecule, c, NULL, &options, &made, NULL);
     REFUSED(ovoid_fit, options, c, all.molecule, NULL, &made, NULL);
@@ -396,9 +422,9 @@ static size_t check_header(const char *path) {
 /* tests/project/symbols.sh sees to it that what is declared is what is exported. */
 static void no_function_is_left_out(void **state) {
     (void)state;
-    static const char *const headers[] = {"context",  "export",  "field",  "file",
-                                          "fit",      "measure", "mesh",   "model",
-                                          "molecule", "opencl",  "picture"};
+    static const char *const headers[] = {"context", "export",   "field",   "file",
+                                          "fit",     "fitter",   "measure", "mesh",
+                                          "model",   "molecule", "opencl",  "picture"};
     size_t found = 0;
     for (size_t i = 0; i < sizeof headers / sizeof *headers; ++i) {
         char path[4096];

@@ -22,7 +22,8 @@ enum {
     CLI_COMPUTE = 6,  /* out of memory, over a limit, or numbers that are not finite */
     CLI_GOAL = 7,     /* all went well, but what a fit reached is not what was asked */
     CLI_SOME = 8,     /* of several inputs some failed */
-    CLI_NONE = 9      /* all of them did, not all for the same reason */
+    CLI_NONE = 9,     /* all of them did, not all for the same reason */
+    CLI_TIME = 10     /* a time limit ended a fit before any model held */
 };
 
 /* ---- main.c: messages ----------------------------------------------------------------------- */

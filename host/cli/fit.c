@@ -4,10 +4,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A signal ends the fit and all that it has made, the time limit the search alone. */
 static bool on_progress(const ovoid_progress *progress, void *user) {
     fit_job *job = user;
     fit_trace_add(&job->tracer, progress);
-    return cli_on_progress(progress, NULL);
+    if (!cli_on_progress(progress, NULL))
+        return false;
+    if (job->time_limit > 0.0 && cli_seconds() - job->fit_began >= job->time_limit)
+        job->out_of_time = true;
+    return !job->out_of_time;
 }
 
 static bool goes_to_standard_output(const char *path) {
@@ -98,9 +103,13 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
     }
     ovoid_fit_result_init(&now->result, sizeof now->result);
     ovoid_context_on_progress(job->context, on_progress, job);
-    const ovoid_status status =
-        ovoid_fit(job->context, job->molecule, &options, &now->model, &now->result);
+    ovoid_status status =
+        ovoid_fitter_reach(job->context, job->fitter, &options, &now->model, &now->result);
     ovoid_context_on_progress(job->context, cli_on_progress, NULL);
+    if (status == OVOID_ERROR_CANCELLED && now->model && !cli_interrupted()) {
+        now->stopped = true;
+        status = OVOID_OK;
+    }
     return status;
 }
 
@@ -119,8 +128,41 @@ static ovoid_status fit_one(fit_job *job, size_t level) {
     return status;
 }
 
-/* The first level is what was asked; what comes of the others and of the profile does not undo it,
- * and only sets *code. */
+/* Whether the time limit ended the search before anything held. */
+static bool ran_out(const fit_job *job, ovoid_status status) {
+    return status == OVOID_ERROR_CANCELLED && job->out_of_time && !cli_interrupted();
+}
+
+/* What comes of the levels after the first does not undo that one, and only sets *code. */
+static ovoid_status fit_others(fit_job *job, int *code) {
+    for (size_t i = 1;
+         i < job->level_count && job->levels[i - 1].result.ellipsoids > 1 && !job->out_of_time;
+         i++) {
+        const ovoid_status further = fit_one(job, i);
+        if (cli_interrupted())
+            return OVOID_ERROR_CANCELLED;
+        if (further != OVOID_OK && !ran_out(job, further))
+            *code = cli_failure(job->context, further, CLI_OUTPUT);
+        if (further != OVOID_OK)
+            break;
+    }
+    return OVOID_OK;
+}
+
+/* All levels, from one preparation of the molecule. */
+static ovoid_status fit_levels(fit_job *job, int *code) {
+    job->fit_began = cli_seconds();
+    ovoid_status status =
+        ovoid_fitter_create(job->context, job->molecule, &job->options, &job->fitter);
+    if (status == OVOID_OK)
+        status = fit_one(job, 0);
+    if (status == OVOID_OK)
+        status = fit_others(job, code);
+    ovoid_fitter_destroy(&job->fitter);
+    return status;
+}
+
+/* What comes of the profile does not undo the models, and only sets *code. */
 static ovoid_status fit(fit_job *job, int *code) {
     ovoid_status status = OVOID_OK;
     if (job->trace)
@@ -128,18 +170,9 @@ static ovoid_status fit(fit_job *job, int *code) {
     if (status == OVOID_OK)
         status = cli_profile_begin(&job->profile, job->context);
     if (status == OVOID_OK)
-        status = fit_one(job, 0);
+        status = fit_levels(job, code);
     if (status != OVOID_OK)
         return status;
-    for (size_t i = 1; i < job->level_count && job->levels[i - 1].result.ellipsoids > 1; i++) {
-        const ovoid_status further = fit_one(job, i);
-        if (cli_interrupted())
-            return OVOID_ERROR_CANCELLED;
-        if (further != OVOID_OK) {
-            *code = cli_failure(job->context, further, CLI_OUTPUT);
-            break;
-        }
-    }
     const ovoid_status profiled = cli_profile_end(&job->profile, job->context);
     if (profiled != OVOID_OK)
         *code = cli_failure(job->context, profiled, CLI_OUTPUT);
@@ -296,7 +329,13 @@ int fit_run(fit_job *job) {
         return CLI_USAGE;
     if (!ovoid_context_device(job->context) && (status = open_device(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
-    if ((status = run_fit(job, &levels, &measured)) != OVOID_OK)
+    status = run_fit(job, &levels, &measured);
+    if (ran_out(job, status)) {
+        cli_error("no model held within the %.9g s of --time-limit, and none is written",
+                  job->time_limit);
+        return CLI_TIME;
+    }
+    if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     const int written = write_outputs(job);
     if (written != CLI_OK || levels != CLI_OK || measured != CLI_OK)
@@ -305,6 +344,7 @@ int fit_run(fit_job *job) {
 }
 
 void fit_job_destroy(fit_job *job) {
+    ovoid_fitter_destroy(&job->fitter);
     fit_trace_destroy(&job->tracer);
     for (size_t i = 0; i < FIT_LEVELS_MAX; i++)
         ovoid_model_destroy(&job->levels[i].model);

@@ -26,6 +26,7 @@ typedef struct fit_level {
     char *owners; /* of the table of owners, owned; NULL: none */
     ovoid_model *model;
     ovoid_fit_result result;
+    bool stopped; /* by the time limit: the best that held by then */
     bool measured;
     ovoid_measures measures;
 } fit_level;
@@ -47,6 +48,7 @@ typedef struct fit_job {
     reading reading;
     ovoid_fit_options options; /* with the method's spacing, never 0 */
     uint32_t level_count;      /* asked for */
+    double time_limit;         /* of the fits of all levels together, seconds; 0: none */
     bool measure;              /* compare the surfaces at the end */
     ovoid_measure_options measuring;
     cli_profile profile; /* of the fits of all levels; `wanted` was asked, the rest came of it */
@@ -55,11 +57,14 @@ typedef struct fit_job {
     FILE *summary; /* NULL: none */
     ovoid_context *context;
     ovoid_molecule *molecule;
+    ovoid_fitter *fitter;             /* during the fits */
+    bool out_of_time;                 /* the time limit ended them */
     fit_level levels[FIT_LEVELS_MAX]; /* all have their paths from the start */
     size_t levels_done; /* have their models; fewer than asked for where halving ends */
     fit_trace tracer;
     bool written; /* the models are */
     bool report_failed, owners_failed;
+    double fit_began;
     double started, device_seconds, read_seconds, measure_seconds, write_seconds, total_seconds;
 } fit_job;
 
@@ -78,8 +83,8 @@ extern const cli_number fit_surface_numbers[], fit_goal_numbers[], fit_adaptive_
     fit_l1_numbers[];
 extern const size_t fit_surface_count, fit_goal_count, fit_adaptive_count, fit_l1_count;
 
-/* And of other structures: fit_job.level_count and ovoid_measure_options.spacing. */
-extern const cli_number fit_levels_number, fit_mesh_spacing_number;
+/* And of other structures: two of fit_job, and ovoid_measure_options.spacing. */
+extern const cli_number fit_levels_number, fit_time_limit_number, fit_mesh_spacing_number;
 
 /* ---- fit_outputs.c --------------------------------------------------------------------------- */
 

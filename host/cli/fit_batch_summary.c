@@ -10,7 +10,10 @@ bool fit_made_model(int code) {
 }
 
 const char *fit_status_name(int code) {
-    return code == CLI_OK ? "done" : code == CLI_GOAL ? "goal not reached" : "failed";
+    return code == CLI_OK     ? "done"
+           : code == CLI_GOAL ? "goal not reached"
+           : code == CLI_TIME ? "out of time"
+                              : "failed";
 }
 
 static int name_width(const fit_row *rows, size_t count) {

@@ -50,6 +50,7 @@ static void print_running(const ovoid_fit_options *defaults, FILE *stream) {
              "ellipsoids and more time (default %s)",
              fit_method_name(defaults->method));
     cli_option_help("--method adaptive|l1", text, stream);
+    cli_number_help(&fit_time_limit_number, NULL, stream);
     cli_option_help("--profile", CLI_HELP_PROFILE " during the fit", stream);
     cli_option_help("-q, --quiet", "print errors, and a goal that was not reached, only", stream);
     cli_option_help("-h, --help", "show this help", stream);

@@ -81,6 +81,10 @@ ovoid_status fit_annotate(const fit_job *job, size_t level) {
         return status;
     print_settings(job, text, sizeof text);
     status = annotate(job, model, "settings", text);
+    if (status == OVOID_OK && job->levels[level].stopped) {
+        snprintf(text, sizeof text, "after the time limit of %.9g s", job->time_limit);
+        status = annotate(job, model, "stopped", text);
+    }
     if (status == OVOID_OK && job->options.method == OVOID_METHOD_ADAPTIVE)
         status = annotate_result(job, level, model);
     return status;

@@ -81,6 +81,19 @@ const cli_number fit_levels_number = {
     "levels of detail: so many models, each with half the ellipsoids of the one before, down to "
     "one; those after FILE.ovoid go to FILE.level2.ovoid, FILE.level3.ovoid and so on"};
 
+const cli_number fit_time_limit_number = {
+    "time-limit",
+    CLI_REAL,
+    offsetof(fit_job, time_limit),
+    0,
+    1e9,
+    true,
+    false,
+    "s",
+    "ends the search after so long, for each molecule and all its levels together; what is written "
+    "is the best model that held by then: one within the tolerance, or of so many ellipsoids. "
+    "Reading before, and measuring and writing after it are not counted"};
+
 const cli_number fit_mesh_spacing_number = {
     "mesh-spacing",
     CLI_REAL,
@@ -108,6 +121,7 @@ enum {
     NO_MEASURE,
     MESH_SPACING,
     LEVELS,
+    TIME_LIMIT,
     PROFILE,
     HELP,
     NUMBERS
@@ -128,6 +142,7 @@ static const struct option named[] = {
     {"no-measure", no_argument, NULL, NO_MEASURE},
     {"mesh-spacing", required_argument, NULL, MESH_SPACING},
     {"levels", required_argument, NULL, LEVELS},
+    {"time-limit", required_argument, NULL, TIME_LIMIT},
     {"profile", no_argument, NULL, PROFILE},
     {"help", no_argument, NULL, HELP},
 };
@@ -359,6 +374,8 @@ static bool parse_named(parser *p, int option) {
     case LEVELS:
         p->adaptive = fit_levels_number.name;
         return cli_number_parse(&fit_levels_number, optarg, job);
+    case TIME_LIMIT:
+        return cli_number_parse(&fit_time_limit_number, optarg, job);
     default: /* MESH_SPACING */
         return cli_number_parse(&fit_mesh_spacing_number, optarg, &job->measuring);
     }

@@ -172,6 +172,7 @@ void cli_print_exit_codes(FILE *stream) {
           "  7    a fit did not reach its goal: the best model it found is written\n"
           "  8    of several molecules some were fitted and some failed\n"
           "  9    of several molecules none was fitted, for different reasons (for one: its code)\n"
+          "  10   a fit's --time-limit was over before any model held: nothing is written\n"
           "  130  interrupted with Ctrl-C (143: terminated, 129: hung up)\n",
           stream);
 }

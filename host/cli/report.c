@@ -99,6 +99,7 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
         add_number(b, "max_error", result->l1.max_error);
     }
     add_number(b, "iterations", (double)result->iterations);
+    b->good = b->good && cJSON_AddBoolToObject(b->object, "stopped", level->stopped);
     if (!l1)
         add_number(b, "solver_iterations", (double)result->adaptive.solver_iterations);
     if (level->measured)
@@ -172,6 +173,8 @@ cJSON *fit_report_make(const fit_job *job) {
     add_options(&b, &job->options);
     if (job->options.method == OVOID_METHOD_ADAPTIVE)
         add_goal(&b, job);
+    if (job->time_limit > 0.0)
+        add_number(&b, "time_limit", job->time_limit);
     add_result(&b, job, &job->levels[0]);
     if (job->level_count > 1)
         add_levels(&b, job);

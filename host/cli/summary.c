@@ -38,6 +38,16 @@ static void print_work(FILE *out, const fit_job *job) {
                 (count)result->adaptive.solver_iterations, method);
 }
 
+static void print_stop(FILE *out, const fit_job *job) {
+    if (!job->out_of_time)
+        return;
+    fprintf(out, "stopped   after the %.9g s of --time-limit: ", job->time_limit);
+    if (job->levels[job->levels_done - 1].stopped && job->levels_done == 1)
+        fputs("the best model that held by then\n", out);
+    else
+        fprintf(out, "%zu of %u levels\n", job->levels_done, (unsigned)job->level_count);
+}
+
 /* What method adaptive was to reach, and what it reached. */
 static void print_goal(FILE *out, const fit_job *job) {
     const ovoid_fit_result *result = &job->levels[0].result;
@@ -106,6 +116,7 @@ void fit_summary_after(const fit_job *job) {
     putc('\n', out);
     const count atoms = ovoid_molecule_atoms(job->molecule);
     print_work(out, job);
+    print_stop(out, job);
     if (!l1)
         print_goal(out, job);
     fprintf(out, "model     %llu ellipsoid%s for %llu atom%s: sparse ratio %.3g\n",

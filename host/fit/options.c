@@ -133,15 +133,19 @@ static ovoid_status check_l1(ovoid_context *context, const ovoid_l1_options *l1)
     return status;
 }
 
-/* Options of the method that is not used are not looked at. */
-ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_options *options) {
+ovoid_status ov_surface_options_check(ovoid_context *context, const ovoid_fit_options *options) {
     const range ranges[] = {
         {"decay", options->decay, 0.0, 100.0, true},
         {"isovalue", options->isovalue, 0.0, 1e6, true},
         {"spacing", options->spacing, 0.0, 1e3, false},
         {"padding", options->padding, 0.0, 1e3, false},
     };
-    const ovoid_status status = check_ranges(context, ranges, sizeof ranges / sizeof *ranges);
+    return check_ranges(context, ranges, sizeof ranges / sizeof *ranges);
+}
+
+/* Options of the method that is not used are not looked at. */
+ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_options *options) {
+    const ovoid_status status = ov_surface_options_check(context, options);
     if (status != OVOID_OK)
         return status;
     switch (options->method) {

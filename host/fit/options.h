@@ -5,5 +5,7 @@
 
 /* OVOID_ERROR_ARGUMENT, naming the option, when one is out of its range. */
 ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_options *options);
+/* The same, of those alone that define the surface. */
+ovoid_status ov_surface_options_check(ovoid_context *context, const ovoid_fit_options *options);
 
 #endif

@@ -116,7 +116,8 @@ typedef struct ovoid_progress {
 } ovoid_progress;
 
 /* Returns true to go on, false to stop: the function that was called then frees what it has made,
- * leaves its outputs untouched and no file behind, and returns OVOID_ERROR_CANCELLED. */
+ * leaves its outputs untouched and no file behind, and returns OVOID_ERROR_CANCELLED; a fit hands
+ * over the best model that held (see ovoid_fit()). */
 typedef bool (*ovoid_progress_fn)(const ovoid_progress *progress, void *user);
 
 /* Calls fn from now on while a function with this context is at work that may take long: reading,

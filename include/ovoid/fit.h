@@ -158,7 +158,9 @@ OVOID_API void ovoid_fit_options_init(ovoid_fit_options *options, size_t size);
 
 /* Fits a model to a molecule's surface on the opened device (opening the default one if none is).
  * The same input, options, device and driver give the same bits. result may be NULL, else it was
- * made by ovoid_fit_result_init(). */
+ * made by ovoid_fit_result_init(). A fit that the progress callback stops (OVOID_ERROR_CANCELLED)
+ * hands over the best model that held by then, or sets *model to NULL, as ovoid_fitter_reach()
+ * does. For more than one fit of a molecule make an ovoid_fitter (fitter.h). */
 OVOID_API ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
                                  const ovoid_fit_options *options, ovoid_model **model,
                                  ovoid_fit_result *result);

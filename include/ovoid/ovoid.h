@@ -13,14 +13,16 @@
  *   model.h     models and their ellipsoids    measure.h  how well a model stands for a molecule
  *   fit.h       from a molecule to a model     picture.h  pictures
  *   field.h     fields, and their values       export.h   files for other programs
+ *   fitter.h    from a molecule to many models, and along a trajectory
  *   file.h      output files
  *
  * Conventions of every function:
  * - Lengths are in angstrom, areas in angstrom^2, decay rates in angstrom^-2, angles in radian,
  *   times in second. Coordinates are those of the input file.
- * - A function that can fail returns an ovoid_status. On failure its outputs are untouched and
- *   ovoid_context_error() describes what happened, with file, line, OpenCL call or device. What can
- *   fail takes the context first, for that text, also where it needs nothing else of it.
+ * - A function that can fail returns an ovoid_status. On failure its outputs are untouched (but see
+ *   ovoid_fit() of a fit that is stopped) and ovoid_context_error() describes what happened, with
+ *   file, line, OpenCL call or device. What can fail takes the context first, for that text, also
+ * where it needs nothing else of it.
  * - xxx_destroy(xxx **) frees, sets the pointer to NULL, and accepts NULL and repeats. What a
  *   function hands out as a pointer to const belongs to the object it came from.
  * - NULL, where it has no meaning of its own: a function that returns a status returns
@@ -63,6 +65,7 @@
 #include "ovoid/field.h"
 #include "ovoid/file.h"
 #include "ovoid/fit.h"
+#include "ovoid/fitter.h"
 #include "ovoid/measure.h"
 #include "ovoid/mesh.h"
 #include "ovoid/model.h"

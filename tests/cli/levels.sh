@@ -58,3 +58,14 @@ run "$OVOID" fit a.xyzr --tolerance 0.3 --steps 0 --levels 2 -q
 expect_code 7
 expect_err "not reached"
 expect_files a.xyzr a.ovoid a.level2.ovoid
+
+# All levels come from one preparation: the molecule's field is sampled once.
+samplings() {
+    tr -d ' \n\t' <"$1" | sed -n 's/.*"name":"field_gradient","launches":\([0-9]*\).*/\1/p'
+}
+run "$OVOID" fit a.xyzr --ellipsoids 11 -o m.ovoid --profile --report one.json
+expect_code 0
+run "$OVOID" fit a.xyzr --ellipsoids 11 --levels 3 -o m.ovoid --profile --report three.json
+expect_code 0
+[ -n "$(samplings one.json)" ] && [ "$(samplings one.json)" = "$(samplings three.json)" ] ||
+    fail "'$(samplings three.json)' samplings for three levels, '$(samplings one.json)' for one"

@@ -24,7 +24,7 @@ N 1.5' >"$work/radii"
 fit() {
     "$ovoid" fit "$work/a.pdb" -o "$work/a.ovoid" -q "$@" || { echo "a fit failed: $*"; exit 1; }
 }
-fit --ratio 1 --levels 2 --profile --assembly 1 --owners "$work/o.csv" --report "$work/1.json"
+fit --ratio 1 --levels 2 --time-limit 1e6 --profile --assembly 1 --owners "$work/o.csv" --report "$work/1.json"
 fit --method l1 --iterations 20 --radii "$work/radii" --report "$work/2.json"
 "$ovoid" measure "$work/a.pdb" "$work/a.ovoid" -q --report "$work/3.json" || exit 1
 "$ovoid" fit "$work/a.pdb" "$work/none.pdb" --ellipsoids 1 --out-dir "$work" --report "$work/4.json" -q 2>/dev/null

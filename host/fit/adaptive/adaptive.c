@@ -30,44 +30,57 @@ static double default_spacing(size_t atoms, double decay) {
            fmin(1.0, sqrt(0.5 / decay));
 }
 
-static ovoid_status prepare(ov_adaptive *f) {
-    ovoid_status status = OVOID_OK;
+/* The room about the atom centres that the band takes, angstrom. */
+static double padding_of(const ov_adaptive *f) {
     const ovoid_fit_options *const options = f->options;
-    f->spacing =
-        options->spacing > 0.0 ? options->spacing : default_spacing(f->atoms, options->decay);
     double radius = 0.0;
-    ov_target_options targets;
-    ov_lattice lattice;
-    ov_target_options_init(&targets);
     for (size_t i = 0; i < f->atoms; ++i)
         radius = fmax(radius, f->xyzr[4 * i + 3]);
     const double reach = radius * radius - log(options->isovalue) / options->decay;
-    const double padding =
-        fmax(options->padding, sqrt(fmax(reach, 0.0)) + FIELD_PADDING / sqrt(2.0 * options->decay));
-    const ov_band band = {.low = targets.low * options->isovalue,
-                          .high = targets.high * options->isovalue,
-                          .inside_every = targets.inside_every,
-                          .outside_low = targets.outside_low * options->isovalue,
-                          .outside_every = targets.outside_every};
+    return fmax(options->padding,
+                sqrt(fmax(reach, 0.0)) + FIELD_PADDING / sqrt(2.0 * options->decay));
+}
+
+static ovoid_status sample(ov_adaptive *f, const ov_target_options *targets) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_fit_options *const options = f->options;
+    const double isovalue = options->isovalue;
+    const ov_band band = {.low = targets->low * isovalue,
+                          .high = targets->high * isovalue,
+                          .inside_every = targets->inside_every,
+                          .outside_low = targets->outside_low * isovalue,
+                          .outside_every = targets->outside_every};
     const ov_sampling sampling = {.go_on = report_sampling, .user = f};
-    f->capacity = f->atoms + f->atoms / 4 + 2;
-    f->quadrics = ov_alloc(f->context, f->capacity, sizeof *f->quadrics, "ellipsoids");
-    f->twin = ov_alloc(f->context, f->capacity, sizeof *f->twin, "ellipsoids");
-    f->parents = ov_alloc(f->context, 2 * f->capacity, sizeof *f->parents, "merges");
-    if (!f->quadrics || !f->twin || !f->parents)
-        return OVOID_ERROR_MEMORY;
-    OV_TRY(ov_lattice_create(f->context, f->xyzr, f->atoms, f->spacing, padding, &lattice));
+    ov_lattice lattice;
+    OV_TRY(ov_lattice_create(f->context, f->xyzr, f->atoms, f->spacing, padding_of(f), &lattice));
     OV_TRY(ov_sample(f->context, f->xyzr, f->atoms, options->decay, &lattice, band, sampling,
                      &f->samples));
-    OV_TRY(ov_target_create(f->context, &f->samples, options->decay, options->isovalue, &targets,
-                            &f->target));
+    OV_TRY(
+        ov_target_create(f->context, &f->samples, options->decay, isovalue, targets, &f->target));
     ov_buffer_destroy(&f->samples.value); /* the target has taken over what it needs */
     ov_buffer_destroy(&f->samples.gradient);
+cleanup:
+    return status;
+}
+
+/* What all goals share, unless it is there. */
+static ovoid_status prepare(ov_adaptive *f) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_fit_options *const options = f->options;
+    ov_target_options targets;
+    if (f->prepared)
+        return OVOID_OK;
+    ov_adaptive_forget(f); /* a part of it may be there */
+    f->spacing =
+        options->spacing > 0.0 ? options->spacing : default_spacing(f->atoms, options->decay);
+    ov_target_options_init(&targets);
+    OV_TRY(sample(f, &targets));
     f->stage = "mesh";
     f->count = f->atoms;
     OV_TRY(ov_judge_create(f->context, f->xyzr, f->atoms, options->decay, options->isovalue,
                            options->adaptive.mesh_spacing,
                            (ov_watch){.go_on = ov_adaptive_report, .user = f}, &f->judge));
+    f->prepared = true;
 cleanup:
     return status;
 }
@@ -170,74 +183,155 @@ static ovoid_verdict verdict_of(const ov_adaptive *f, size_t count, const ov_jud
     return judgement->deviation <= wanted->tolerance ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
 }
 
-/* The last judgement, and the model in the paper's parameters. */
-static ovoid_status finish(ov_adaptive *f, ov_trial *best, ovoid_ellipsoid **ellipsoids,
+/* ---- what came of it ------------------------------------------------------------------------ */
+
+/* Hands over the trial's owners and the quadrics f->quadrics, which are its. */
+static ovoid_status hand_over(const ov_adaptive *f, const ov_trial *t, ov_found *found) {
+    ov_found made = {.count = t->count};
+    made.quadrics = ov_alloc(f->context, t->count, sizeof *made.quadrics, "ellipsoids");
+    made.owner = ov_alloc(f->context, f->atoms, sizeof *made.owner, "owners");
+    if (!made.quadrics || !made.owner) {
+        ov_found_destroy(&made);
+        return OVOID_ERROR_MEMORY;
+    }
+    memcpy(made.quadrics, f->quadrics, t->count * sizeof *made.quadrics);
+    memcpy(made.owner, t->owner, f->atoms * sizeof *made.owner);
+    *found = made;
+    return OVOID_OK;
+}
+
+static void tell(const ov_adaptive *f, size_t count, const ov_judgement *judgement,
+                 ovoid_fit_result *result) {
+    result->spacing = f->spacing;
+    result->points = f->samples.points.count;
+    result->ellipsoids = count;
+    result->iterations = f->steps;
+    result->adaptive.solver_iterations = ov_adaptive_solver_iterations(f) - f->solver_before;
+    result->distance = judgement->valid && !is_coarse(f) ? judgement->deviation : NAN;
+    result->verdict = verdict_of(f, count, judgement);
+    result->reached = result->verdict == OVOID_VERDICT_REACHED;
+}
+
+/* The last judgement, with the volumes made equal. */
+static ovoid_status finish(ov_adaptive *f, const ov_trial *best, ov_found *found,
                            ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_judgement judgement;
     ov_adaptive_quadrics(f, best);
     OV_TRY(calibrate(f, best->count, &judgement));
-    *ellipsoids = ov_alloc(f->context, best->count, sizeof **ellipsoids, "ellipsoids");
-    if (!*ellipsoids)
-        return OVOID_ERROR_MEMORY;
-    for (size_t i = 0; i < best->count; ++i)
-        ov_ellipsoid_of_quadric(&f->quadrics[i], &(*ellipsoids)[i]);
-    result->spacing = f->spacing;
-    result->points = f->samples.points.count;
-    result->ellipsoids = best->count;
-    result->iterations = f->steps;
-    result->adaptive.solver_iterations =
-        f->refiner.solver.iterations + f->local.refiner.solver.iterations;
-    result->distance = judgement.valid && !is_coarse(f) ? judgement.deviation : NAN;
-    result->verdict = verdict_of(f, best->count, &judgement);
-    result->reached = result->verdict == OVOID_VERDICT_REACHED;
+    OV_TRY(hand_over(f, best, found));
+    tell(f, best->count, &judgement, result);
 cleanup:
     return status;
 }
 
-static void destroy(ov_adaptive *f) {
+/* What held when the search was stopped, as it was: no more questions are asked. */
+static void rescue(ov_adaptive *f, ov_found *found, ovoid_fit_result *result) {
+    if (!f->held)
+        return;
+    ov_adaptive_quadrics(f, f->held);
+    if (hand_over(f, f->held, found) == OVOID_OK)
+        tell(f, f->held->count, &f->held->judgement, result);
+}
+
+void ov_found_destroy(ov_found *found) {
+    free(found->quadrics);
+    free(found->owner);
+    *found = (ov_found){0};
+}
+
+/* ---- the whole ------------------------------------------------------------------------------ */
+
+ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size_t atoms, bool keep,
+                                ov_adaptive **adaptive) {
+    ov_adaptive *f = ov_alloc(context, 1, sizeof *f, "a fit");
+    if (!f)
+        return OVOID_ERROR_MEMORY;
+    *f = (ov_adaptive){.context = context,
+                       .xyzr = xyzr,
+                       .atoms = atoms,
+                       .keep = keep,
+                       .capacity = atoms + atoms / 4 + 2,
+                       .refiner = {.context = context},
+                       .local = {.refiner = {.context = context}}};
+    f->quadrics = ov_alloc(context, f->capacity, sizeof *f->quadrics, "ellipsoids");
+    f->twin = ov_alloc(context, f->capacity, sizeof *f->twin, "ellipsoids");
+    f->parents = ov_alloc(context, 2 * f->capacity, sizeof *f->parents, "merges");
+    if (!f->quadrics || !f->twin || !f->parents) {
+        ov_adaptive_destroy(&f);
+        return OVOID_ERROR_MEMORY;
+    }
+    *adaptive = f;
+    return OVOID_OK;
+}
+
+void ov_adaptive_forget(ov_adaptive *f) {
+    f->prepared = false;
     ov_adaptive_drop_reductions(f);
-    ov_refiner_destroy(&f->refiner);
-    ov_local_destroy(&f->local);
-    ov_merger_destroy(&f->merger);
+    ov_refiner_forget(&f->refiner);
     ov_judge_destroy(&f->judge);
     ov_target_destroy(&f->target);
     ov_samples_destroy(&f->samples);
+}
+
+void ov_adaptive_destroy(ov_adaptive **adaptive) {
+    ov_adaptive *const f = *adaptive;
+    if (!f)
+        return;
+    ov_adaptive_forget(f);
+    ov_refiner_destroy(&f->refiner);
+    ov_local_destroy(&f->local);
+    ov_merger_destroy(&f->merger);
     free(f->quadrics);
     free(f->twin);
     free(f->parents);
+    free(f);
+    *adaptive = NULL;
 }
 
-ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t atoms,
-                             const ovoid_fit_options *options, double began,
-                             ovoid_ellipsoid **ellipsoids, uint32_t **owner,
-                             ovoid_fit_result *result) {
-    ovoid_status status = OVOID_OK;
+ovoid_status ov_adaptive_check(ovoid_context *context, const ovoid_adaptive_options *wanted,
+                               size_t atoms) {
+    if (wanted->goal == OVOID_GOAL_ELLIPSOIDS && wanted->ellipsoids > atoms)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "%llu ellipsoids are asked for, and there are only %zu atoms to begin with",
+                       (unsigned long long)wanted->ellipsoids, atoms);
+    return OVOID_OK;
+}
+
+/* Nothing of the search before stays, so that a second goal comes to the bits that it comes to
+ * alone. */
+static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const ov_found *start) {
+    f->options = options;
+    f->start = start;
+    f->held = NULL;
+    f->steps = 0;
+    f->misfit = 0.0;
+    f->solver_before = ov_adaptive_solver_iterations(f);
+    ov_refiner_forget(&f->refiner);
+}
+
+ovoid_status ov_adaptive_reach(ov_adaptive *f, const ovoid_fit_options *options,
+                               const ov_found *start, double began, ov_found *found,
+                               ovoid_fit_result *result) {
     ov_device *device;
     uint64_t before[OVOID_COUNTS];
     ov_trial best = {0};
-    ov_adaptive f = {.context = context,
-                     .xyzr = xyzr,
-                     .atoms = atoms,
-                     .options = options,
-                     .refiner = {.context = context},
-                     .local = {.refiner = {.context = context}}};
-    if (options->adaptive.goal == OVOID_GOAL_ELLIPSOIDS && options->adaptive.ellipsoids > atoms)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT,
-                       "%llu ellipsoids are asked for, and there are only %zu atoms to begin with",
-                       (unsigned long long)options->adaptive.ellipsoids, atoms);
-    OV_TRY(ov_device_get(context, &device));
+    ovoid_status status = ov_device_get(f->context, &device);
+    if (status != OVOID_OK)
+        return status;
     ov_device_counted(device, NULL, before);
-    OV_TRY(prepare(&f));
-    OV_TRY(ov_trial_create(&f, &best));
+    begin_search(f, options, start);
+    OV_TRY(prepare(f));
+    OV_TRY(ov_trial_create(f, &best));
     result->sample_seconds = ov_seconds() - began;
-    OV_TRY(reach_goal(&f, &best));
-    OV_TRY(finish(&f, &best, ellipsoids, result));
-    *owner = best.owner;
-    best.owner = NULL;
-    ov_device_counted(device, before, result->counts);
+    OV_TRY(reach_goal(f, &best));
+    OV_TRY(finish(f, &best, found, result));
 cleanup:
+    if (status == OVOID_ERROR_CANCELLED)
+        rescue(f, found, result);
+    if (status == OVOID_OK || status == OVOID_ERROR_CANCELLED)
+        ov_device_counted(device, before, result->counts);
     ov_trial_destroy(&best);
-    destroy(&f);
+    f->held = NULL;
     return status;
 }

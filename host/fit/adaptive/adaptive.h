@@ -5,13 +5,43 @@
 
 #include "field/field.h"
 
-/* Fits to the molecule's surface. *ellipsoids and *owner, the ellipsoid of each atom, are
- * allocated (free with free()); result's counts, errors and profile are filled in. Seconds in
- * result count from began. A goal that is not reached is no error: result says so, and the model
- * is the best there was. */
-ovoid_status ov_adaptive_fit(ovoid_context *context, const double *xyzr, size_t atoms,
-                             const ovoid_fit_options *options, double began,
-                             ovoid_ellipsoid **ellipsoids, uint32_t **owner,
-                             ovoid_fit_result *result);
+/* A molecule as the method prepares it, once for all goals: the points about its surface, what a
+ * model is held to there, its mesh, and how its atoms merge. */
+typedef struct ov_adaptive ov_adaptive;
+
+/* Of a model: what a search begins with or ends with. owner has an entry per atom. */
+typedef struct ov_found {
+    ov_quadric *quadrics;
+    size_t count;
+    uint32_t *owner;
+} ov_found;
+
+void ov_found_destroy(ov_found *found);
+
+/* Prepares nothing yet. xyzr stays the caller's, to outlive it. keep: how atoms merge stays for the
+ * next goal, too; as large as the molecule. */
+ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size_t atoms, bool keep,
+                                ov_adaptive **adaptive);
+void ov_adaptive_destroy(ov_adaptive **adaptive);
+
+/* Forgets what depends on where the atoms are: it is made anew by the next search. Buffers and
+ * kernels stay. */
+void ov_adaptive_forget(ov_adaptive *adaptive);
+
+/* Whether `ellipsoids` of them can be asked for. */
+ovoid_status ov_adaptive_check(ovoid_context *context, const ovoid_adaptive_options *wanted,
+                               size_t atoms);
+
+/* Fits to the molecule's surface, from the atoms, or where that is not NULL from `start`. What
+ * defines the surface, the spacings and the padding are the same in all options of one ov_adaptive.
+ * Seconds in result count from began; its counts, errors and profile are filled in. A goal that is
+ * not reached is no error: result says so, and the model is the best there was.
+ *
+ * With OVOID_ERROR_CANCELLED *found is the best that held, if one did, and result says of it what
+ * was known; else both are untouched, as on other errors. Whatever happens, the next search can
+ * follow. */
+ovoid_status ov_adaptive_reach(ov_adaptive *adaptive, const ovoid_fit_options *options,
+                               const ov_found *start, double began, ov_found *found,
+                               ovoid_fit_result *result);
 
 #endif

@@ -72,9 +72,46 @@ cleanup:
     return status;
 }
 
+/* A start of fewer or more than so many times as many is not worth its while. */
+#define START_TIMES 2
+
+static bool is_near(const ov_adaptive *f, size_t count) {
+    return f->start && f->start->count <= START_TIMES * count &&
+           count <= START_TIMES * f->start->count;
+}
+
+/* From the model given: at its own count, never worse than that. */
+static ovoid_status fit_start(ov_adaptive *f, size_t count, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    ov_trial other = {0};
+    OV_TRY(ov_adaptive_take_start(f, best));
+    const bool keeps = best->count == count;
+    if (!keeps)
+        OV_TRY(ov_adaptive_recount(f, count, best));
+    if (best->count != count)
+        goto cleanup;
+    f->held = best;
+    OV_TRY(ov_adaptive_judge(f, best));
+    OV_TRY(ov_trial_create(f, &other));
+    ov_trial_copy(best, &other);
+    OV_TRY(ov_adaptive_refine_fully(f, &other, "refine"));
+    OV_TRY(ov_adaptive_judge(f, &other));
+    if (!keeps || other.judgement.score < best->judgement.score)
+        ov_trial_swap(&other, best);
+    OV_TRY(repair(f, best, REPAIRS_PER_EFFORT * (f->options->adaptive.effort - 1)));
+cleanup:
+    ov_trial_destroy(&other);
+    return status;
+}
+
 ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     ov_trial other = {0};
+    if (is_near(f, count)) {
+        OV_TRY(fit_start(f, count, best));
+        if (best->count == count)
+            goto cleanup;
+    }
     OV_TRY(fit_window(f, count, 0, best));
     if (f->options->adaptive.effort == 1)
         goto cleanup;

@@ -52,6 +52,10 @@ void ov_trial_swap(ov_trial *a, ov_trial *b) {
     *b = swap;
 }
 
+uint64_t ov_adaptive_solver_iterations(const ov_adaptive *f) {
+    return f->refiner.solver.iterations + f->local.refiner.solver.iterations;
+}
+
 /* ---- progress ------------------------------------------------------------------------------- */
 
 bool ov_adaptive_report(void *fit) {
@@ -175,6 +179,8 @@ static ovoid_status start(ov_adaptive *f, size_t kinds, size_t count, ov_trial *
     if (kinds > 1)
         OV_TRY(ov_trial_create(f, &other));
     OV_TRY(ov_adaptive_cut(f, 0, count, best));
+    if (f->options->adaptive.goal != OVOID_GOAL_TOLERANCE && !f->held)
+        f->held = best; /* so many it are, and each step makes them better */
     if (kinds > 1)
         OV_TRY(ov_adaptive_refine(f, best, "refine", 12, 1e-1, 3e-3));
     for (size_t kind = 1; kind < kinds; ++kind) {
@@ -183,16 +189,17 @@ static ovoid_status start(ov_adaptive *f, size_t kinds, size_t count, ov_trial *
         if (other.misfit < best->misfit)
             ov_trial_swap(&other, best);
     }
-    ov_adaptive_drop_reductions(f); /* as large as the molecule, and quick to make again */
+    if (!f->keep)
+        ov_adaptive_drop_reductions(f); /* as large as the molecule, and quick to make again */
     OV_TRY(ov_adaptive_refine_fully(f, best, "refine"));
 cleanup:
     ov_trial_destroy(&other);
     return status;
 }
 
-/* Lets further refinement aim at the right volume: the window about the surface is not symmetric,
- * and the fit to phi itself comes out a few tenths of a percent too small or too large. */
-static ovoid_status aim_at_volume(ov_adaptive *f, const ov_trial *t) {
+/* The window about the surface is not symmetric, and the fit to phi itself comes out a few tenths
+ * of a percent too small or too large. */
+ovoid_status ov_adaptive_aim_at_volume(ov_adaptive *f, const ov_trial *t) {
     ovoid_status status = OVOID_OK;
     double ratio;
     ov_adaptive_quadrics(f, t);
@@ -202,13 +209,20 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size_t count,
-                               ov_trial *best) {
+ovoid_status ov_adaptive_aim(ov_adaptive *f, size_t window) {
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_target_window(f->context, &f->target, windows[window].width, windows[window].floor));
     OV_TRY(ov_target_scale(f->context, &f->target, 1.0));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size_t count,
+                               ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_adaptive_aim(f, window));
     OV_TRY(start(f, kinds, count, best));
-    OV_TRY(aim_at_volume(f, best));
+    OV_TRY(ov_adaptive_aim_at_volume(f, best));
     OV_TRY(ov_adaptive_refine(f, best, "refine", 5, 1e-1, 1e-3));
 cleanup:
     return status;

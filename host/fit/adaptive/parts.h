@@ -18,11 +18,14 @@
 /* Ways to merge, and windows about the surface. */
 enum { OV_STARTS = 6, OV_WINDOWS = 3 };
 
-typedef struct ov_adaptive {
+struct ov_adaptive {
     ovoid_context *context;
     const double *xyzr;
     size_t atoms;
-    const ovoid_fit_options *options;
+    bool keep;                        /* the reductions */
+    bool prepared;                    /* points, target and judge are there */
+    const ovoid_fit_options *options; /* of this search */
+    const ov_found *start;            /* NULL: the atoms */
     ov_samples samples;
     ov_target target;
     ov_reduction *reduction[OV_STARTS];
@@ -32,14 +35,18 @@ typedef struct ov_adaptive {
     ov_judge judge;
     double spacing; /* of the points */
     const char *stage;
-    uint64_t steps; /* refinement steps so far */
-    size_t count;   /* ellipsoids being worked on */
+    uint64_t steps;         /* refinement steps so far */
+    uint64_t solver_before; /* iterations of conjugate gradients before this search */
+    size_t count;           /* ellipsoids being worked on */
     double misfit;
     size_t capacity; /* ellipsoids that the arrays below hold */
     ov_quadric *quadrics;
     uint32_t *twin;    /* of halves, as of ov_split_worst() */
     uint32_t *parents; /* of merges, as of ov_merging */
-} ov_adaptive;
+    /* The best that held so far in this search, NULL: none did. A trial that is changed in place
+     * only as long as each of its states holds. */
+    const struct ov_trial *held;
+};
 
 /* A model with what is known of it. */
 typedef struct ov_trial {
@@ -50,6 +57,9 @@ typedef struct ov_trial {
     double misfit;
     ov_judgement judgement;
 } ov_trial;
+
+/* Of conjugate gradients, in all searches. */
+uint64_t ov_adaptive_solver_iterations(const ov_adaptive *f);
 
 /* Tells the caller where an ov_adaptive is; false: the caller has had enough. */
 bool ov_adaptive_report(void *fit);
@@ -92,6 +102,15 @@ const ov_reduction_options *ov_adaptive_merging(void);
  * chosen have no atoms. */
 ovoid_status ov_adaptive_rebuild(ov_adaptive *f, ov_trial *t, double factor, const bool *chosen);
 void ov_adaptive_drop_reductions(ov_adaptive *f);
+/* Asks for phi under one window: the target as it was before any search. */
+ovoid_status ov_adaptive_aim(ov_adaptive *f, size_t window);
+/* Lets further refinement aim at the right volume, known from a model that was fitted to phi. */
+ovoid_status ov_adaptive_aim_at_volume(ov_adaptive *f, const ov_trial *t);
+/* The model that the search begins with, under the first window, and with the right volume. */
+ovoid_status ov_adaptive_take_start(ov_adaptive *f, ov_trial *t);
+/* Merges or splits and refines on the way, until there are so many; more are left where no two can
+ * merge. */
+ovoid_status ov_adaptive_recount(ov_adaptive *f, size_t count, ov_trial *t);
 /* Refined from the first `kinds` starts, under one window, and with the right volume but for a
  * little. */
 ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size_t count,

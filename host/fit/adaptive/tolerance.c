@@ -71,6 +71,25 @@ cleanup:
     return status;
 }
 
+/* From the model given, unless it is off in so many places that the atoms are the better start: t
+ * does not hold then. One that holds stays as it is. */
+static ovoid_status grow_start(ov_adaptive *f, double tolerance, ov_trial *t) {
+    ovoid_status status = OVOID_OK;
+    ov_spots spots = {0};
+    const ov_growing how = {.stage = "grow", .most = f->atoms, .rounds = GROW_ROUNDS};
+    OV_TRY(ov_adaptive_take_start(f, t));
+    OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
+    if (f->options->adaptive.steps == 0 || ov_trial_holds(t, tolerance))
+        goto cleanup;
+    OV_TRY(ov_adaptive_refine_fully(f, t, "refine"));
+    OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
+    if ((double)spots.count <= TOO_MANY * (double)t->count)
+        OV_TRY(ov_adaptive_grow(f, tolerance, &how, t, &spots));
+cleanup:
+    ov_spots_destroy(&spots);
+    return status;
+}
+
 /* The atoms themselves: the field and its surface, exactly. */
 static ovoid_status take_atoms(ov_adaptive *f, ov_trial *t) {
     const ovoid_status status = ov_adaptive_cut(f, 0, f->atoms, t);
@@ -79,13 +98,20 @@ static ovoid_status take_atoms(ov_adaptive *f, ov_trial *t) {
 
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(start_and_grow(f, tolerance, best));
+    if (f->start)
+        OV_TRY(grow_start(f, tolerance, best));
+    if (!f->start || !ov_trial_holds(best, tolerance))
+        OV_TRY(start_and_grow(f, tolerance, best));
+    if (ov_trial_holds(best, tolerance))
+        f->held = best;
     if (f->options->adaptive.steps == 0 || !f->judge.mesh)
         goto cleanup;
     if (!ov_trial_holds(best, tolerance))
         OV_TRY(take_atoms(f, best));
-    if (ov_trial_holds(best, tolerance))
+    if (ov_trial_holds(best, tolerance)) {
+        f->held = best;
         OV_TRY(ov_adaptive_shrink(f, tolerance, best));
+    }
     ov_adaptive_quadrics(f, best);
     OV_TRY(ov_owner_tidy(f->context, f->xyzr, f->atoms, f->quadrics, best->count, OWNER_SHARE,
                          OWNER_REACH, best->owner));

@@ -25,6 +25,9 @@ typedef struct fit {
     double *gradient_before; /* at trial, between searches */
     bool comparable;         /* both gradients are of E_s alone, for the same ellipsoids */
     double step;             /* last accepted tau, 0 before the first */
+    uint64_t iterations;     /* done */
+    ov_l1_evaluation now;    /* at x, where `known` */
+    bool known;
 } fit;
 
 /* Step 5.1. Keeps at least one ellipsoid, the largest. */
@@ -157,33 +160,39 @@ static bool report(const fit *f, uint64_t iteration, bool accuracy_phase, ov_l1_
     return ov_progress_report(f->objective.context, &progress);
 }
 
+static ovoid_status evaluate(fit *f) {
+    f->known = false;
+    const ovoid_status status = ov_l1_evaluate(&f->objective, f->x, f->count, &f->now);
+    f->known = status == OVOID_OK;
+    return status;
+}
+
 /* Algorithm 1, step 5. A phase ends early when two searches in a row, the second one with a fresh
  * first step, find no descent: nothing would change any more. */
-static ovoid_status iterate(fit *f, ov_l1_evaluation *now, uint64_t *iterations) {
+static ovoid_status iterate(fit *f) {
     ovoid_status status = OVOID_OK;
     const ovoid_l1_options *const l1 = &f->options->l1;
     uint64_t sparse_end = l1->sparse_iterations;
     unsigned failures = 0;
     bool alone_before = false; /* the last accepted step went along the gradient of E_s alone */
-    *iterations = 0;
-    OV_TRY(ov_l1_evaluate(&f->objective, f->x, f->count, now));
+    OV_TRY(evaluate(f));
     for (uint64_t n = 1; n <= l1->iterations; ++n) {
         double tau;
         const bool pruned = n % l1->prune_every == 0 && prune(f);
         if (pruned ||
             failures > 0) /* after a failure the device holds a rejected trial's residual */
-            OV_TRY(ov_l1_evaluate(&f->objective, f->x, f->count, now));
+            OV_TRY(evaluate(f));
         const bool accuracy_phase = n > sparse_end;
         const ov_l1_weights w = choose_weights(
-            l1, *now, ov_l1_sparse_term(&f->objective, f->x, f->count), accuracy_phase);
+            l1, f->now, ov_l1_sparse_term(&f->objective, f->x, f->count), accuracy_phase);
         const bool alone = w.sparse == 0.0;
         OV_TRY(next_gradient(f, w));
         f->comparable = alone && alone_before && !pruned;
-        OV_TRY(line_search(f, w, now, &tau));
-        *iterations = n;
+        OV_TRY(line_search(f, w, &f->now, &tau));
+        f->iterations = n;
         failures = tau > 0.0 ? 0 : failures + 1;
         alone_before = alone && tau > 0.0;
-        if (!report(f, n, accuracy_phase, w, *now, tau)) {
+        if (!report(f, n, accuracy_phase, w, f->now, tau)) {
             status = ov_fail(f->objective.context, OVOID_ERROR_CANCELLED,
                              "stopped at iteration %llu of %lu", (unsigned long long)n,
                              (unsigned long)l1->iterations);
@@ -276,26 +285,35 @@ static ovoid_status find_owners(const fit *f, const double *xyzr, size_t atoms, 
     return OVOID_OK;
 }
 
+static void tell(const fit *f, ovoid_fit_result *result) {
+    const double points = (double)f->objective.samples->points.count;
+    result->points = f->objective.samples->points.count;
+    result->ellipsoids = f->count;
+    result->iterations = f->iterations;
+    result->l1 = f->objective.profile;
+    result->l1.rms_error = f->known ? sqrt(f->now.accuracy / points) : NAN;
+    result->l1.max_error = f->known ? f->now.max_error : NAN;
+}
+
 ovoid_status ov_l1_fit(ovoid_context *context, const double *xyzr, size_t atoms,
                        const ov_samples *samples, const ovoid_fit_options *options,
                        ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
     uint64_t before[OVOID_COUNTS];
-    ov_l1_evaluation last;
     fit f = {.options = options, .count = atoms};
     OV_TRY(ov_device_get(context, &device));
     ov_device_counted(device, NULL, before);
     OV_TRY(allocate(&f, context, samples));
     initialise(&f, xyzr);
-    OV_TRY(iterate(&f, &last, &result->iterations));
-    OV_TRY(find_owners(&f, xyzr, atoms, owner));
-    OV_TRY(hand_over(&f, ellipsoids));
-    result->points = samples->points.count;
-    result->ellipsoids = f.count;
-    result->l1 = f.objective.profile;
-    result->l1.rms_error = sqrt(last.accuracy / (double)samples->points.count);
-    result->l1.max_error = last.max_error;
+    status = iterate(&f);
+    if (status != OVOID_OK && !(status == OVOID_ERROR_CANCELLED && f.iterations > 0))
+        goto cleanup;
+    if (find_owners(&f, xyzr, atoms, owner) != OVOID_OK || hand_over(&f, ellipsoids) != OVOID_OK) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    tell(&f, result);
     ov_device_counted(device, before, result->counts);
 cleanup:
     destroy(&f);

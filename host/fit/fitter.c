@@ -1,0 +1,398 @@
+#include "fit/fitter.h"
+
+#include "base/progress.h"
+#include "base/sized.h"
+#include "base/tenant.h"
+#include "fit/adaptive/adaptive.h"
+#include "fit/l1/l1.h"
+#include "fit/motion.h"
+#include "fit/options.h"
+#include "model/factor.h"
+#include "model/model.h"
+#include "model/owner.h"
+#include "molecule/molecule.h"
+#include "neighbours/neighbours.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* An atom's owner is looked for among the ellipsoids this near (angstrom), if there are any. */
+#define OWNER_REACH 15.0
+
+struct ovoid_fitter {
+    ov_tenant tenant;
+    ovoid_context *context; /* of the tenant, while that has one */
+    bool once;
+    double *xyzr;
+    size_t atoms;
+    ovoid_fit_options surface; /* what defines it; method and goal are those of each fit */
+    ov_adaptive *adaptive;     /* of the opened device; NULL until it is needed */
+    ov_l1_band *band;          /* of method l1, likewise */
+    ov_found start;            /* what method adaptive begins with; count 0: the atoms */
+    ov_found last;             /* what it came to after that; count 0: nothing */
+};
+
+/* ---- the object ------------------------------------------------------------------------------ */
+
+static void leave_device(ov_tenant *tenant) {
+    ovoid_fitter *const fitter = (ovoid_fitter *)tenant; /* its first member */
+    ov_adaptive_destroy(&fitter->adaptive);
+    ov_l1_band_destroy(&fitter->band);
+}
+
+ovoid_status ov_fitter_create(ovoid_context *context, const ovoid_molecule *molecule,
+                              const ovoid_fit_options *options, bool once, ovoid_fitter **fitter) {
+    ovoid_status status = OVOID_OK;
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    ovoid_fitter *made = NULL;
+    ovoid_fit_options surface;
+    ovoid_fit_options_init(&surface, sizeof surface);
+    OV_TRY(OV_SIZED_TAKE(context, ovoid_fit_options, options, &surface));
+    OV_TRY(ov_surface_options_check(context, &surface));
+    const double *const xyzr = ovoid_molecule_xyzr(molecule);
+    OV_TRY(ov_atoms_check(context, xyzr, atoms, surface.decay));
+    made = ov_alloc(context, 1, sizeof *made, "a fitter");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    *made = (ovoid_fitter){.context = context, .once = once, .atoms = atoms, .surface = surface};
+    ov_tenant_join(context, &made->tenant, leave_device);
+    made->xyzr = ov_alloc(context, 4 * atoms, sizeof *made->xyzr, "atoms");
+    if (!made->xyzr) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    memcpy(made->xyzr, xyzr, 4 * atoms * sizeof *xyzr);
+    *fitter = made;
+    made = NULL;
+cleanup:
+    ovoid_fitter_destroy(&made);
+    return status;
+}
+
+ovoid_status ovoid_fitter_create(ovoid_context *context, const ovoid_molecule *molecule,
+                                 const ovoid_fit_options *options, ovoid_fitter **fitter) {
+    OV_NEED(context, context);
+    OV_NEED(context, molecule);
+    OV_NEED(context, options);
+    OV_NEED(context, fitter);
+    return ov_fitter_create(context, molecule, options, false, fitter);
+}
+
+void ovoid_fitter_destroy(ovoid_fitter **fitter) {
+    if (!fitter || !*fitter)
+        return;
+    ov_tenant_part(&(*fitter)->tenant);
+    ov_found_destroy(&(*fitter)->start);
+    ov_found_destroy(&(*fitter)->last);
+    free((*fitter)->xyzr);
+    free(*fitter);
+    *fitter = NULL;
+}
+
+/* ---- fitting --------------------------------------------------------------------------------- */
+
+static ovoid_status check_same(ovoid_context *context, const char *name, double made, double now) {
+    return made == now
+               ? OVOID_OK
+               : ov_fail(context, OVOID_ERROR_ARGUMENT,
+                         "option %s is %.9g, and the fitter was made for %.9g", name, now, made);
+}
+
+/* The surface is that of the fitter. */
+static ovoid_status check_surface(const ovoid_fitter *fitter, const ovoid_fit_options *options) {
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = fitter->context;
+    const ovoid_fit_options *const made = &fitter->surface;
+    OV_TRY(check_same(context, "decay", made->decay, options->decay));
+    OV_TRY(check_same(context, "isovalue", made->isovalue, options->isovalue));
+    OV_TRY(check_same(context, "spacing", made->spacing, options->spacing));
+    OV_TRY(check_same(context, "padding", made->padding, options->padding));
+    if (options->method == OVOID_METHOD_ADAPTIVE)
+        OV_TRY(check_same(context, "mesh_spacing", made->adaptive.mesh_spacing,
+                          options->adaptive.mesh_spacing));
+cleanup:
+    return status;
+}
+
+/* By method l1; *ellipsoids NULL: nothing is handed over. */
+static ovoid_status fit_l1(ovoid_fitter *fitter, const ovoid_fit_options *options, double began,
+                           ovoid_ellipsoid **ellipsoids, uint32_t **owner,
+                           ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(
+        ov_l1_band_prepare(fitter->context, fitter->xyzr, fitter->atoms, options, &fitter->band));
+    result->sample_seconds = ov_seconds() - began;
+    result->spacing = options->spacing > 0.0 ? options->spacing : OVOID_DEFAULT_SPACING_L1;
+    result->reached = true;
+    result->verdict = OVOID_VERDICT_NO_GOAL;
+    OV_TRY(ov_l1_fit(fitter->context, fitter->xyzr, fitter->atoms, ov_l1_band_samples(fitter->band),
+                     options, ellipsoids, owner, result));
+cleanup:
+    return status;
+}
+
+/* The model in the paper's parameters, with a copy of its owners. */
+static ovoid_status hand_over(ovoid_context *context, const ov_found *found, size_t atoms,
+                              ovoid_ellipsoid **ellipsoids, uint32_t **owner) {
+    ovoid_ellipsoid *const made = ov_alloc(context, found->count, sizeof *made, "ellipsoids");
+    uint32_t *const owned = ov_alloc(context, atoms, sizeof *owned, "owners");
+    if (!made || !owned) {
+        free(made);
+        free(owned);
+        return OVOID_ERROR_MEMORY;
+    }
+    for (size_t i = 0; i < found->count; ++i)
+        ov_ellipsoid_of_quadric(&found->quadrics[i], &made[i]);
+    memcpy(owned, found->owner, atoms * sizeof *owned);
+    *ellipsoids = made;
+    *owner = owned;
+    return OVOID_OK;
+}
+
+static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *options,
+                                 double began, ovoid_ellipsoid **ellipsoids, uint32_t **owner,
+                                 ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = fitter->context;
+    ov_found found = {0};
+    OV_TRY(ov_adaptive_check(context, &options->adaptive, fitter->atoms));
+    if (!fitter->adaptive)
+        OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, !fitter->once,
+                                  &fitter->adaptive));
+    status =
+        ov_adaptive_reach(fitter->adaptive, options,
+                          fitter->start.count > 0 ? &fitter->start : NULL, began, &found, result);
+    if (found.count > 0) {
+        if (hand_over(context, &found, fitter->atoms, ellipsoids, owner) != OVOID_OK) {
+            status = OVOID_ERROR_MEMORY;
+            goto cleanup;
+        }
+        ov_found_destroy(&fitter->last);
+        fitter->last = found;
+        found = (ov_found){0};
+    }
+cleanup:
+    ov_found_destroy(&found);
+    return status;
+}
+
+static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, double began,
+                        ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
+    OV_TRY(ov_fit_options_check(fitter->context, options));
+    ov_progress_fit(fitter->context, options->method);
+    result->method = options->method;
+    OV_TRY(check_surface(fitter, options));
+    OV_TRY(ov_device_get(fitter->context, &device));
+    OV_TRY(options->method == OVOID_METHOD_L1
+               ? fit_l1(fitter, options, began, ellipsoids, owner, result)
+               : fit_adaptive(fitter, options, began, ellipsoids, owner, result));
+cleanup:
+    return status;
+}
+
+/* The model of what was found, and the last of the result. */
+static ovoid_status make_model(const ovoid_fitter *fitter, const ovoid_ellipsoid *ellipsoids,
+                               uint32_t **owner, double began, ovoid_fit_result *result,
+                               ovoid_model **model) {
+    const ovoid_status status =
+        ovoid_model_create(fitter->context, ellipsoids, (size_t)result->ellipsoids,
+                           fitter->surface.decay, fitter->surface.isovalue, model);
+    if (status == OVOID_OK)
+        ov_model_take_owner(*model, owner, fitter->atoms);
+    result->fit_seconds = ov_seconds() - began - result->sample_seconds;
+    return status;
+}
+
+/* A model with OVOID_OK, and maybe with OVOID_ERROR_CANCELLED. */
+static ovoid_status reach(ovoid_fitter *fitter, const ovoid_fit_options *options,
+                          ovoid_model **model, ovoid_fit_result *result) {
+    ovoid_ellipsoid *ellipsoids = NULL;
+    uint32_t *owner = NULL;
+    const double began = ov_seconds();
+    ovoid_status status = fit(fitter, options, began, &ellipsoids, &owner, result);
+    if (ellipsoids && (status == OVOID_OK || status == OVOID_ERROR_CANCELLED)) {
+        const ovoid_status made = make_model(fitter, ellipsoids, &owner, began, result, model);
+        status = made == OVOID_OK ? status : made;
+    }
+    free(ellipsoids);
+    free(owner);
+    return status;
+}
+
+ovoid_status ovoid_fitter_reach(ovoid_context *context, ovoid_fitter *fitter,
+                                const ovoid_fit_options *options, ovoid_model **model,
+                                ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    ovoid_model *made = NULL;
+    ovoid_fit_options wanted;
+    ovoid_fit_result done;
+    OV_NEED(context, context);
+    OV_NEED(context, fitter);
+    OV_NEED(context, options);
+    OV_NEED(context, model);
+    ovoid_fit_options_init(&wanted, sizeof wanted);
+    ovoid_fit_result_init(&done, sizeof done);
+    ov_progress_begin(context, "sample");
+    context->now.ellipsoids = fitter->atoms;
+    OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
+    OV_TRY(OV_SIZED_TAKE(context, ovoid_fit_options, options, &wanted));
+    OV_TRY(ov_sized_check(context, "ovoid_fit_result", result));
+    status = reach(fitter, &wanted, &made, &done);
+    if (status == OVOID_OK || status == OVOID_ERROR_CANCELLED)
+        *model = made;
+    if (made)
+        ov_sized_give(result, &done, sizeof done);
+cleanup:
+    ov_progress_end(context);
+    return status;
+}
+
+/* ---- starts ---------------------------------------------------------------------------------- */
+
+static ovoid_status check_start(const ovoid_fitter *fitter, const ovoid_model *model) {
+    ovoid_context *const context = fitter->context;
+    const ovoid_fit_options *const made = &fitter->surface;
+    if (ovoid_model_size(model) > fitter->atoms)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "a start has at most as many ellipsoids as there are atoms, %zu; this model "
+                       "has %zu",
+                       fitter->atoms, ovoid_model_size(model));
+    if (ovoid_model_decay(model) != made->decay || ovoid_model_isovalue(model) != made->isovalue)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "a start stands for the same surface, decay %.9g and isovalue %.9g; this "
+                       "model has %.9g and %.9g",
+                       made->decay, made->isovalue, ovoid_model_decay(model),
+                       ovoid_model_isovalue(model));
+    return OVOID_OK;
+}
+
+/* Gives each atom to the ellipsoid with the largest value at its centre. */
+static ovoid_status find_owners(const ovoid_fitter *fitter, ov_found *found) {
+    ovoid_status status = OVOID_OK;
+    uint32_t near[2 * OV_NEAR_MAX];
+    ov_grid grid = {0};
+    OV_TRY(ov_grid_of(fitter->context, found->quadrics->centre, sizeof *found->quadrics,
+                      found->count, OWNER_REACH, &grid));
+    for (size_t i = 0; i < fitter->atoms; ++i) {
+        const double *const at = fitter->xyzr + 4 * i;
+        const size_t near_count = ov_grid_near(&grid, at, UINT32_MAX, near);
+        double largest = -INFINITY;
+        if (near_count == 0)
+            found->owner[i] = ov_owner_at(found->quadrics, found->count, at);
+        for (size_t n = 0; n < near_count; ++n) {
+            const double value = ov_quadric_log_value(&found->quadrics[near[n]], at);
+            if (n == 0 || value > largest) {
+                largest = value;
+                found->owner[i] = near[n];
+            }
+        }
+    }
+cleanup:
+    ov_grid_destroy(&grid);
+    return status;
+}
+
+static ovoid_status found_create(ovoid_context *context, size_t count, size_t atoms,
+                                 ov_found *found) {
+    *found = (ov_found){.count = count};
+    found->quadrics = ov_alloc(context, count, sizeof *found->quadrics, "ellipsoids");
+    found->owner = ov_alloc(context, atoms, sizeof *found->owner, "owners");
+    return found->quadrics && found->owner ? OVOID_OK : OVOID_ERROR_MEMORY;
+}
+
+static ovoid_status take_model(const ovoid_fitter *fitter, const ovoid_model *model,
+                               ov_found *found) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(found_create(fitter->context, ovoid_model_size(model), fitter->atoms, found));
+    for (size_t i = 0; i < found->count; ++i)
+        ov_quadric_of_ellipsoid(&ovoid_model_ellipsoids(model)[i], &found->quadrics[i]);
+    if (ovoid_model_owner_count(model) == fitter->atoms)
+        memcpy(found->owner, ovoid_model_owner(model), fitter->atoms * sizeof *found->owner);
+    else
+        OV_TRY(find_owners(fitter, found));
+cleanup:
+    return status;
+}
+
+/* The start is `found` from now on, which is taken over. */
+static void take_start(ovoid_fitter *fitter, ov_found *found) {
+    ov_found_destroy(&fitter->last);
+    ov_found_destroy(&fitter->start);
+    fitter->start = *found;
+    *found = (ov_found){0};
+}
+
+ovoid_status ovoid_fitter_start_from(ovoid_context *context, ovoid_fitter *fitter,
+                                     const ovoid_model *model) {
+    ovoid_status status = OVOID_OK;
+    ov_found found = {0};
+    OV_NEED(context, context);
+    OV_NEED(context, fitter);
+    OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
+    if (model) {
+        OV_TRY(check_start(fitter, model));
+        OV_TRY(take_model(fitter, model, &found));
+    }
+    take_start(fitter, &found);
+cleanup:
+    ov_found_destroy(&found);
+    return status;
+}
+
+/* ---- other coordinates ----------------------------------------------------------------------- */
+
+/* The last model where the atoms are now; *found is empty where there is none. */
+static ovoid_status move_model(const ovoid_fitter *fitter, const double *after, ov_found *found) {
+    ovoid_status status = OVOID_OK;
+    const ov_found *const from = fitter->last.count > 0 ? &fitter->last : &fitter->start;
+    if (from->count == 0)
+        return OVOID_OK;
+    OV_TRY(found_create(fitter->context, from->count, fitter->atoms, found));
+    memcpy(found->quadrics, from->quadrics, from->count * sizeof *from->quadrics);
+    memcpy(found->owner, from->owner, fitter->atoms * sizeof *from->owner);
+    OV_TRY(ov_move_with_atoms(fitter->context, fitter->xyzr, after, fitter->atoms, found->owner,
+                              found->quadrics, found->count));
+cleanup:
+    return status;
+}
+
+static ovoid_status check_coordinates(const ovoid_fitter *fitter, const double *xyz) {
+    for (size_t n = 0; n < 3 * fitter->atoms; ++n)
+        if (!(fabs(xyz[n]) <= OV_COORDINATE_LIMIT))
+            return ov_fail(
+                fitter->context, OVOID_ERROR_ARGUMENT,
+                "ovoid_fitter_move: %c of atom %zu (from 0) is %g: not within %g angstrom",
+                "xyz"[n % 3], n / 3, xyz[n], OV_COORDINATE_LIMIT);
+    return OVOID_OK;
+}
+
+ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, const double *xyz) {
+    ovoid_status status = OVOID_OK;
+    ov_found found = {0};
+    double *after = NULL;
+    OV_NEED(context, context);
+    OV_NEED(context, fitter);
+    OV_NEED(context, xyz);
+    OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
+    OV_TRY(check_coordinates(fitter, xyz));
+    after = ov_alloc(context, 4 * fitter->atoms, sizeof *after, "atoms");
+    if (!after)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < fitter->atoms; ++i) {
+        memcpy(after + 4 * i, xyz + 3 * i, 3 * sizeof *xyz);
+        after[4 * i + 3] = fitter->xyzr[4 * i + 3];
+    }
+    OV_TRY(move_model(fitter, after, &found));
+    memcpy(fitter->xyzr, after, 4 * fitter->atoms * sizeof *after);
+    take_start(fitter, &found);
+    if (fitter->adaptive)
+        ov_adaptive_forget(fitter->adaptive);
+    ov_l1_band_destroy(&fitter->band);
+cleanup:
+    ov_found_destroy(&found);
+    free(after);
+    return status;
+}

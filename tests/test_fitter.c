@@ -548,7 +548,7 @@ static void a_start_that_holds_is_kept(void **state) {
     for (unsigned at = 1; at <= all.asked; at += 1 + all.asked / 20, ++tried)
         held += expect_stop(*state, molecule, fitter, &options, at);
     print_message("%u of %u stops held\n", held, tried);
-    assert_true(2 * held > tried);
+    assert_true(10 * held >= 9 * tried); /* all but the first */
     ovoid_model_destroy(&start);
     ovoid_model_destroy(&model);
     ovoid_fitter_destroy(&fitter);

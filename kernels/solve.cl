@@ -281,8 +281,9 @@ SOLVE_KERNEL void solve_product(const uint count, const float lambda,
     leave_sum(sum, scratch, pq);
 }
 
-/* alpha = rz / pq; x += alpha p, r -= alpha q, z = block^-1 r, and the partial sums of r . z. */
-SOLVE_KERNEL void solve_update(const uint count, const uint groups,
+/* alpha = rz / pq; x += alpha p, r -= alpha q, z = block^-1 r, and the partial sums of r . z. Where
+ * rz is not above `least` the iteration was not to be done any more: x and r stay. */
+SOLVE_KERNEL void solve_update(const uint count, const uint groups, const float least,
                                __global const float *restrict block,
                                __global const float *restrict rz, __global const float *restrict pq,
                                __global const float *restrict p, __global const float *restrict q,
@@ -292,8 +293,8 @@ SOLVE_KERNEL void solve_update(const uint count, const uint groups,
     __local float alpha;
     const uint index = get_global_id(0);
     if (get_local_id(0) == 0) {
-        const float curvature = take_sum(pq, groups);
-        alpha = curvature > 0.0f ? take_sum(rz, groups) / curvature : 0.0f;
+        const float curvature = take_sum(pq, groups), before = take_sum(rz, groups);
+        alpha = curvature > 0.0f && before > least ? before / curvature : 0.0f;
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     const float sum = index < count ? advance_one(index, alpha, block, p, q, x, r, z) : 0.0f;
@@ -348,7 +349,7 @@ static inline float sum_of_group(float own, __local float *scratch) {
 /* The three above in one, by one work-group: for up to OV_SOLVE_ALONE ellipsoids, for which a
  * launch takes longer than what it does. Each work-item has its own ellipsoids from beginning to
  * end. rz: the partial sums of `groups` groups; rz_next: one sum. */
-__kernel void solve_step(const uint count, const float lambda, const uint groups,
+__kernel void solve_step(const uint count, const float lambda, const uint groups, const float least,
                          __global const float *restrict factor,
                          __global const float *restrict moments,
                          __global const float *restrict diagonal,
@@ -366,7 +367,7 @@ __kernel void solve_step(const uint count, const float lambda, const uint groups
     for (uint index = at; index < count; index += size)
         sum += multiply_one(index, lambda, factor, moments, diagonal, p, q);
     const float curvature = sum_of_group(sum, scratch);
-    const float alpha = curvature > 0.0f ? before / curvature : 0.0f;
+    const float alpha = curvature > 0.0f && before > least ? before / curvature : 0.0f;
     sum = 0.0f;
     for (uint index = at; index < count; index += size)
         sum += advance_one(index, alpha, block, p, q, x, r, z);

@@ -89,8 +89,8 @@ static void earlier_structures_get_defaults(void **state) {
     struct {
         size_t size;
         double isovalue;
-        double other; /* where spacing is today */
-    } options = {offsetof(ovoid_mesh_options, spacing), 1.0, NAN};
+        double other, more; /* where spacing and the rest are today */
+    } options = {offsetof(ovoid_mesh_options, spacing), 1.0, NAN, 0.0};
     ovoid_molecule *molecule = two_atoms(*state);
     ovoid_mesh *mesh = NULL;
     assert_int_equal(offsetof(ovoid_mesh_options, spacing), 2 * sizeof(double));

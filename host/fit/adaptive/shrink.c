@@ -159,9 +159,11 @@ static void choose_nearest(const shrinking *s, const ov_spots *spots) {
         double least = INFINITY;
         for (size_t i = 0; i < s->next.count; ++i) {
             double square = 0.0;
+            if (!is_merged(s, i))
+                continue;
             for (int k = 0; k < 3; ++k)
                 square += pow(centre_of(s->next.x, i)[k] - spots->spot[n].at[k], 2);
-            if (is_merged(s, i) && square < least) {
+            if (square < least) {
                 least = square;
                 best = i;
             }

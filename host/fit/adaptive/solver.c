@@ -1,5 +1,6 @@
 #include "fit/adaptive/solver.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,6 +19,8 @@ static ovoid_status prepare(ovoid_context *context, ov_solver *s, size_t count) 
     OV_TRY(ov_device_get(context, &device));
     s->group = device->solve_group;
     s->wide = device->shape.lanes == 1 ? s->group : OV_SOLVE_WIDE;
+    if (s->looks == OV_LOOKS_OF_DEVICE)
+        s->looks = device->shape.lanes == 1 ? OV_LOOKS_WAIT : OV_LOOKS_LAG;
     groups = groups_of(s, count);
     if (!s->start.handle) {
         OV_TRY(ov_kernel_create(context, "solve", "solve_product", &s->product));
@@ -52,9 +55,9 @@ static ovoid_status upload_factors(ovoid_context *context, ov_solver *s, const d
 
 /* ---- looks at the residual ------------------------------------------------------------------ */
 
-/* The residual is read while the device goes on, and looked at an iteration later: that costs an
- * iteration too many, but no wait. A look is begun after each fourth iteration but one, so that
- * four or a multiple of it are done. */
+/* The residual is looked at after each fourth iteration. CPUs wait for it, which takes less than an
+ * iteration. To others it is a round trip: it is read while the next iteration runs, which then
+ * leaves x alone if it was not to be done any more. */
 #define LOOK_EVERY 4
 
 typedef struct look {
@@ -70,14 +73,31 @@ static ovoid_status begin_look(ovoid_context *context, const ov_buffer *sums, si
                                 &l->later);
 }
 
+static double sum_of(const look *l) {
+    double sum = 0.0;
+    for (size_t k = 0; k < l->groups; ++k)
+        sum += l->partial[k];
+    return sum;
+}
+
 /* The sum stays where no look was begun. */
 static ovoid_status end_look(ovoid_context *context, look *l, double *sum) {
     if (!l->later.event)
         return OVOID_OK;
     const ovoid_status status = ov_later_end(context, &l->later);
-    *sum = 0.0;
-    for (size_t k = 0; status == OVOID_OK && k < l->groups; ++k)
-        *sum += l->partial[k];
+    if (status == OVOID_OK)
+        *sum = sum_of(l);
+    return status;
+}
+
+/* Waits for the sum. */
+static ovoid_status look_now(ovoid_context *context, const ov_buffer *sums, size_t groups, look *l,
+                             double *sum) {
+    l->groups = groups;
+    const ovoid_status status =
+        ov_buffer_read(context, sums, 0, l->partial, groups * sizeof *l->partial);
+    if (status == OVOID_OK)
+        *sum = sum_of(l);
     return status;
 }
 
@@ -91,6 +111,7 @@ typedef struct work {
     const ov_system *system;
     cl_float lambda;
     cl_uint count, groups; /* ellipsoids; partial sums in s->rz */
+    cl_float least;        /* residual to be reached, for iterations that may be too many; or 0 */
 } work;
 
 /* The moments of J^T W J p. */
@@ -112,11 +133,11 @@ static ovoid_status step_alone(work *w) {
     const cl_uint groups = w->groups;
     w->groups = 1;
     return OV_LAUNCH(w->context, &s->step, s->wide, s->wide, OV_ARG(w->count), OV_ARG(w->lambda),
-                     OV_ARG(groups), OV_ARG(s->factor.memory), OV_ARG(s->moments.memory),
-                     OV_ARG(s->diagonal.memory), OV_ARG(s->block.memory), OV_ARG(s->rz.memory),
-                     OV_ARG(s->p.memory), OV_ARG(s->q.memory), OV_ARG(s->x.memory),
-                     OV_ARG(s->r.memory), OV_ARG(s->z.memory), OV_ARG(s->polynomial.memory),
-                     OV_ARG(s->rz_next.memory));
+                     OV_ARG(groups), OV_ARG(w->least), OV_ARG(s->factor.memory),
+                     OV_ARG(s->moments.memory), OV_ARG(s->diagonal.memory), OV_ARG(s->block.memory),
+                     OV_ARG(s->rz.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory),
+                     OV_ARG(s->x.memory), OV_ARG(s->r.memory), OV_ARG(s->z.memory),
+                     OV_ARG(s->polynomial.memory), OV_ARG(s->rz_next.memory));
 }
 
 /* The same by many. */
@@ -129,9 +150,10 @@ static ovoid_status step_together(const work *w) {
                      OV_ARG(s->diagonal.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory),
                      OV_ARG(s->pq.memory)));
     OV_TRY(OV_LAUNCH(context, &s->update, w->count, s->group, OV_ARG(w->count), OV_ARG(w->groups),
-                     OV_ARG(s->block.memory), OV_ARG(s->rz.memory), OV_ARG(s->pq.memory),
-                     OV_ARG(s->p.memory), OV_ARG(s->q.memory), OV_ARG(s->x.memory),
-                     OV_ARG(s->r.memory), OV_ARG(s->z.memory), OV_ARG(s->rz_next.memory)));
+                     OV_ARG(w->least), OV_ARG(s->block.memory), OV_ARG(s->rz.memory),
+                     OV_ARG(s->pq.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory),
+                     OV_ARG(s->x.memory), OV_ARG(s->r.memory), OV_ARG(s->z.memory),
+                     OV_ARG(s->rz_next.memory)));
     OV_TRY(OV_LAUNCH(context, &s->direction, w->count, s->group, OV_ARG(w->count),
                      OV_ARG(w->groups), OV_ARG(s->factor.memory), OV_ARG(s->rz.memory),
                      OV_ARG(s->rz_next.memory), OV_ARG(s->z.memory), OV_ARG(s->p.memory),
@@ -164,24 +186,25 @@ static ovoid_status end_both(ovoid_context *context, look *first, look *later,
 static ovoid_status iterate(work *w, uint32_t iterations, double tolerance, bool *still) {
     ovoid_status status = OVOID_OK;
     ov_solver *const s = w->s;
-    double start = 0.0, now = 0.0;
+    double start = 0.0, now = INFINITY;
+    cl_float least = 0.0f;
     look first = {.partial = s->host}, later = {.partial = s->host + groups_of(s, w->count)};
     *still = false;
     if (iterations > 0)
         OV_TRY(begin_look(w->context, &s->rz, w->groups, &first));
-    for (uint32_t k = 1; k <= iterations; ++k) {
+    for (uint32_t k = 1; k <= iterations && now > (double)least; ++k) {
+        w->least = later.later.event ? least : 0.0f;
         OV_TRY(iteration(w));
         OV_TRY(end_look(w->context, &first, &start));
-        now = k == 1 ? start : now;
-        OV_TRY(end_look(w->context, &later, &now));
+        least = (cl_float)(tolerance * tolerance * start);
         *still = !(start > 0.0);
-        if (*still)
+        OV_TRY(end_look(w->context, &later, &now));
+        if (*still || !(now > (double)least))
             break;
         ++s->iterations;
-        if (!(now > tolerance * tolerance * start))
-            break;
-        if (k % LOOK_EVERY == LOOK_EVERY - 1)
-            OV_TRY(begin_look(w->context, &s->rz, w->groups, &later));
+        if (k % LOOK_EVERY == 0 && k < iterations)
+            OV_TRY(s->looks == OV_LOOKS_WAIT ? look_now(w->context, &s->rz, w->groups, &later, &now)
+                                             : begin_look(w->context, &s->rz, w->groups, &later));
     }
 cleanup:
     return end_both(w->context, &first, &later, status);
@@ -196,7 +219,7 @@ ovoid_status ov_solve(ovoid_context *context, ov_solver *s, ov_operations *opera
     const size_t size = count * (size_t)OV_FACTOR_PARAMETERS;
     bool still;
     OV_TRY(prepare(context, s, count));
-    work w = {context, s, operations, system, damping, count, (cl_uint)groups_of(s, count)};
+    work w = {context, s, operations, system, damping, count, (cl_uint)groups_of(s, count), 0.0f};
     OV_TRY(upload_factors(context, s, system->parameters, count));
     OV_TRY(OV_LAUNCH(context, &s->start, count, s->group, OV_ARG(count), OV_ARG(damping),
                      OV_ARG(s->factor.memory), OV_ARG(system->gram->memory),

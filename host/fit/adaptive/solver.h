@@ -1,13 +1,16 @@
 /*
  * One Levenberg-Marquardt step on the device: conjugate gradients on the damped normal equations,
- * matrix free (kernels/solve.cl). The host starts kernels, and looks at each residual while the
- * next iteration runs, which it waits for the first time when it reads the step.
+ * matrix free (kernels/solve.cl). The host starts kernels and looks at the residual now and then;
+ * vectors stay on the device until the step is read.
  */
 #ifndef OV_SOLVER_H
 #define OV_SOLVER_H
 
 #include "field/field.h"
 #include "model/factor.h"
+
+/* Looks at the residual: waited for, or an iteration late. The device decides unless tests do. */
+typedef enum ov_looks { OV_LOOKS_OF_DEVICE, OV_LOOKS_WAIT, OV_LOOKS_LAG } ov_looks;
 
 typedef struct ov_solver {
     ov_kernel start, product, update, direction, step;
@@ -16,8 +19,9 @@ typedef struct ov_solver {
     ov_buffer moments;    /* of it */
     float *host;          /* factors as uploaded, steps and sums as read back */
     size_t host_capacity;
-    size_t group;        /* ellipsoids in a work-group of many, */
-    size_t wide;         /* and work-items in the only one */
+    size_t group; /* ellipsoids in a work-group of many, */
+    size_t wide;  /* and work-items in the only one */
+    ov_looks looks;
     bool apart;          /* set by tests: as if there were many */
     uint64_t iterations; /* of conjugate gradients, all solves together */
 } ov_solver;

@@ -483,6 +483,7 @@ static bool expect_stop(ovoid_context *context, const ovoid_molecule *molecule,
         options->adaptive.goal == OVOID_GOAL_TOLERANCE) {
         expect_holds(context, molecule, model, options->adaptive.tolerance);
         assert_true(result.distance <= options->adaptive.tolerance);
+        assert_true(result.distance >= deviation_of(context, molecule, model) - 1e-4); /* a bound */
     } else if (options->method == OVOID_METHOD_ADAPTIVE) {
         assert_int_equal(ovoid_model_size(model), options->adaptive.ellipsoids);
     }

@@ -73,7 +73,7 @@ static void one_point_after_another(void **state) {
     ovoid_field *field = field_of_chain(*state);
     assert_int_equal(ovoid_field_terms(field), ATOMS);
     assert_true(ovoid_field_decay(field) == 0.5 && ovoid_field_isovalue(field) == 1.0);
-    for (size_t i = 0; i < ATOMS; i += test_size(7, 60))
+    for (size_t i = 0; i < ATOMS; i += test_size(7, 150))
         expect_point(*state, field, i);
     ovoid_field_destroy(&field);
     assert_null(field);
@@ -101,6 +101,7 @@ static void later_calls_pay_for_their_points_alone(void **state) {
 
 /* Few points find their terms on the host, many on the device: they agree. */
 static void few_and_many_agree(void **state) {
+    test_skip_simulated(*state);
     const size_t count = test_size(2000, 400);
     double *const xyz = test_alloc(count, 3 * sizeof *xyz);
     double *const value = test_alloc(count, sizeof *value);
@@ -128,6 +129,7 @@ static void few_and_many_agree(void **state) {
 
 /* Ellipsoids of every shape; the terms that the host finds are those that count. */
 static void every_kind_of_model(void **state) {
+    test_skip_simulated(*state);
     enum { TERMS = 60 };
     ovoid_ellipsoid ellipsoids[TERMS];
     for (int kind = 0; kind < MODEL_KINDS; ++kind) {

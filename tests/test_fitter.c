@@ -483,6 +483,7 @@ static bool expect_stop(ovoid_context *context, const ovoid_molecule *molecule,
         options->adaptive.goal == OVOID_GOAL_TOLERANCE) {
         expect_holds(context, molecule, model, options->adaptive.tolerance);
         assert_true(result.distance <= options->adaptive.tolerance);
+        assert_true(result.distance >= deviation_of(context, molecule, model) - 1e-4); /* a bound */
     } else if (options->method == OVOID_METHOD_ADAPTIVE) {
         assert_int_equal(ovoid_model_size(model), options->adaptive.ellipsoids);
     }
@@ -548,7 +549,7 @@ static void a_start_that_holds_is_kept(void **state) {
     for (unsigned at = 1; at <= all.asked; at += 1 + all.asked / 20, ++tried)
         held += expect_stop(*state, molecule, fitter, &options, at);
     print_message("%u of %u stops held\n", held, tried);
-    assert_true(2 * held > tried);
+    assert_true(10 * held >= 9 * tried); /* all but the first */
     ovoid_model_destroy(&start);
     ovoid_model_destroy(&model);
     ovoid_fitter_destroy(&fitter);

@@ -43,8 +43,8 @@ OVOID_API void ovoid_fitter_destroy(ovoid_fitter **fitter);
  *
  * OVOID_ERROR_CANCELLED, when the progress callback asked to stop, hands over the best model that
  * held by then, if one did: *model is it, to be destroyed by the caller, and *result says of it
- * what is known (distance: NAN where it was not measured yet); otherwise *model is NULL and *result
- * untouched. What holds is
+ * what is known (distance: what the search knew, no less than it is; NAN where it was not measured
+ * yet); otherwise *model is NULL and *result untouched. What holds is
  * - of OVOID_GOAL_TOLERANCE a model within the tolerance: from the end of growing on;
  * - of OVOID_GOAL_ELLIPSOIDS and OVOID_GOAL_RATIO one of so many ellipsoids: once the atoms are
  *   merged;

@@ -16,8 +16,6 @@
  * The kernels over bricks take several to a work-item where work-items are dear.
  */
 
-#define CASE_BYTES 16
-
 /* Points of a brick that are its last in x, y and z, for bricks of 4 x 2 x 2. */
 #define LAST_X 0x8888u
 #define LAST_Y 0xf0f0u
@@ -116,7 +114,7 @@ __kernel void march_count(const uint nx, const uint ny, const uint nz, const uin
         const corners c = load_corners(sign, brick, nx, ny);
         uint count = 0;
         for (uint cells = mixed_cells(&c); cells; cells &= cells - 1)
-            count += cases[case_of(&c, lowest_bit(cells)) * CASE_BYTES];
+            count += cases[case_of(&c, lowest_bit(cells)) * OV_CASE_BYTES];
         const uint x = c.at[0] ^ c.at[1], y = c.at[0] ^ c.at[2], z = c.at[0] ^ c.at[4];
         crossing[brick] = (uint4)(0, x, y, z);
         found[k] = popcount(x) + popcount(y) + popcount(z) + (count << 8);
@@ -262,7 +260,7 @@ __kernel void march_triangles(const uint count, __global const uint4 *restrict l
     size_t at = (size_t)list[item].z * 3;
     for (uint cells = mixed_cells(&c); cells; cells &= cells - 1) {
         const uint point = lowest_bit(cells);
-        __global const uchar *const entry = cases + case_of(&c, point) * CASE_BYTES;
+        __global const uchar *const entry = cases + case_of(&c, point) * OV_CASE_BYTES;
         const uint edges = 3u * entry[0];
         for (uint k = 1; k <= edges; ++k, ++at) {
             const uint axis = entry[k] >> 3;

@@ -6,22 +6,17 @@
  * pack are a block of OV_BLOCK_X columns and OV_BLOCK_Y rows, blocks row by row; everything that is
  * kept per ray is stored in that order. A work-item follows one vector of a pack.
  *
- * Space is cut into boxes: a tile of tile * tile rays, and of the depth a slab of OV_STEPS steps.
- * start, item: the terms that reach box b are item[start[b]] .. item[start[b + 1] - 1], where b is
- * box_of[tile * slabs + slab]. Slab 0 begins at z = front.
+ * Space is cut into boxes: a tile of tile * tile rays, and of the depth a slab of OV_SLAB_STEPS
+ * steps. start, item: the terms that reach box b are item[start[b]] .. item[start[b + 1] - 1],
+ * where b is box_of[tile * slabs + slab]. Slab 0 begins at z = front.
  */
 
-#define OV_BLOCK_X 4
-#define OV_BLOCK_Y 4
 #if OV_BLOCK_X * OV_BLOCK_Y != OV_PACK
 #error "a block of rays is a pack"
 #endif
-#define OV_STEPS 4
 /* Vectors of rays in a pack, a work-item each. Several in one would share nothing, and some drivers
  * bound the rounds of a work-item's loops: llvmpipe's (Mesa 22.3) end after 65535 altogether. */
 #define OV_PARTS (OV_PACK / OV_VECTOR)
-/* Depth of a ray that meets nothing. */
-#define OV_NOWHERE (-1e30f)
 /* Newton steps within a bracket of at most one step. */
 #define OV_REFINEMENTS 5
 
@@ -67,12 +62,13 @@ static inline void ov_along(const ov_box_terms list, ov_vec x, ov_vec y, ov_vec 
     *growth = slope * M_LN2_F;
 }
 
-/* The same at OV_STEPS depths of each ray: what does not depend on the depth is computed once. */
+/* The same at OV_SLAB_STEPS depths of each ray: what does not depend on the depth is computed once.
+ */
 static inline void ov_march(const ov_box_terms list, ov_vec x, ov_vec y, float z, float step,
                             ov_vec *value, ov_vec *growth) {
-    ov_vec sum[OV_STEPS], slope[OV_STEPS];
+    ov_vec sum[OV_SLAB_STEPS], slope[OV_SLAB_STEPS];
 #pragma unroll
-    for (uint s = 0; s < OV_STEPS; ++s)
+    for (uint s = 0; s < OV_SLAB_STEPS; ++s)
         sum[s] = slope[s] = 0.0f;
     for (uint k = list.first; k < list.end; ++k) {
         const ov_term t = list.terms[list.item[k]];
@@ -81,7 +77,7 @@ static inline void ov_march(const ov_box_terms list, ov_vec x, ov_vec y, float z
             t.log2_amplitude - fma(dx, fma(dy, (ov_vec)(t.xy), dx * t.xx), dy * (dy * t.yy));
         const ov_vec tilt = fma(dx, (ov_vec)(t.xz), dy * t.yz);
 #pragma unroll
-        for (uint s = 0; s < OV_STEPS; ++s) {
+        for (uint s = 0; s < OV_SLAB_STEPS; ++s) {
             const float dz = z - (float)(s + 1) * step - t.z;
             const ov_vec half_slope = tilt + dz * t.zz;
             const ov_vec e = ov_exp2(fma(half_slope, (ov_vec)(-dz), flat));
@@ -90,7 +86,7 @@ static inline void ov_march(const ov_box_terms list, ov_vec x, ov_vec y, float z
         }
     }
 #pragma unroll
-    for (uint s = 0; s < OV_STEPS; ++s) {
+    for (uint s = 0; s < OV_SLAB_STEPS; ++s) {
         value[s] = sum[s];
         growth[s] = slope[s] * M_LN2_F;
     }
@@ -181,12 +177,12 @@ __kernel void trace(const uint packs, const uint blocks, const uint tile, const 
             before = before_growth = 0.0f;
             continue;
         }
-        const float z0 = front - (float)(slab * OV_STEPS) * step;
-        ov_vec value[OV_STEPS], growth[OV_STEPS];
+        const float z0 = front - (float)(slab * OV_SLAB_STEPS) * step;
+        ov_vec value[OV_SLAB_STEPS], growth[OV_SLAB_STEPS];
         ov_march(list, x, y, z0, step, value, growth);
         ov_bracket bracket = {z0, z0, 0.0f, 1.0f};
         ov_ivec caught = 0;
-        for (uint s = 0; s < OV_STEPS; ++s) {
+        for (uint s = 0; s < OV_SLAB_STEPS; ++s) {
             const float above = z0 - (float)s * step, here = z0 - (float)(s + 1) * step;
             const ov_ivec free = open & ~caught;
             const ov_ivec inside = free & OV_MASK(value[s] >= level);
@@ -248,7 +244,7 @@ trace_ellipsoids(const uint packs, const uint blocks, const uint tile, const uin
     ov_ivec which = 0, open = -1;
     for (uint slab = 0; slab < slabs && OV_ANY(open); ++slab) {
         const ov_box_terms list = ov_terms_of(start, item, terms, boxes[slab]);
-        const float bottom = front - (float)((slab + 1) * OV_STEPS) * step;
+        const float bottom = front - (float)((slab + 1) * OV_SLAB_STEPS) * step;
         for (uint k = list.first; k < list.end; ++k) {
             const ov_term t = terms[item[k]];
             const ov_vec dx = x - t.x, dy = y - t.y;
@@ -297,7 +293,7 @@ __kernel void compare(const uint packs, const uint blocks, const uint tile, cons
     const ov_vec z = OV_LOAD(part, depth + base);
     const ov_vec steep = OV_LOAD(part, slope + base);
     const ov_ivec seen = OV_MASK(z > OV_NOWHERE);
-    const ov_vec place = clamp((front - z) / (OV_STEPS * step), -1.0f, (float)slabs);
+    const ov_vec place = clamp((front - z) / (OV_SLAB_STEPS * step), -1.0f, (float)slabs);
     const ov_ivec slab_of = select((ov_ivec)-1, OV_TO_INT(floor(place)), seen);
     ov_vec sum = 0.0f;
     int own[OV_VECTOR], low = (int)slabs, high = -1;

@@ -54,6 +54,17 @@ typedef float ov_f32;
 #define OV_SOLVE_FACTOR 6
 #define OV_SOLVE_BLOCK 55
 
+/* Blocks of rays that make up a pack, steps of a ray within a slab of depth, and the depth of a ray
+ * that meets nothing (kernels/render.cl). */
+#define OV_BLOCK_X 4
+#define OV_BLOCK_Y 4
+#define OV_SLAB_STEPS 4
+#define OV_NOWHERE (-1e30f)
+
+/* Bytes of a case of marching cubes: the number of its triangles, then three edges for each
+ * (host/mesh/case_table.h, kernels/march.cl). */
+#define OV_CASE_BYTES 16
+
 /* Triangles in a leaf of the tree over a mesh, and floats of each (kernels/distance.cl). */
 #define OV_LEAF 16
 #define OV_TRIANGLE 18

@@ -52,6 +52,17 @@ int test_close(void **state) {
     return 0;
 }
 
+void test_group_of_lane(void **state) {
+    const char *const wanted = getenv("OVOID_TEST_GROUP");
+    ov_device *device;
+    test_check(*state, ov_device_get(*state, &device));
+    if (!wanted)
+        skip();
+    const unsigned long group = strtoul(wanted, NULL, 10);
+    assert_int_equal(device->solve_group, group);
+    assert_int_equal(device->team, device->shape.lanes == 1 ? 1 : group);
+}
+
 void *test_alloc(size_t count, size_t size) {
     void *const memory = calloc(count > 0 ? count : 1, size);
     if (!memory)

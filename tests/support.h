@@ -42,6 +42,9 @@ void test_skip_simulated(ovoid_context *context);
 int test_open(void **state);
 int test_close(void **state);
 
+/* A test of any lane: a device's groups are as large as OVOID_TEST_GROUP says, where it is set. */
+void test_group_of_lane(void **state);
+
 /* Allocates or aborts; free with free(). Zeroed. */
 void *test_alloc(size_t count, size_t size);
 

@@ -349,6 +349,7 @@ static void gram_repeats_itself(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_group_of_lane),
         cmocka_unit_test(gram_equals_twin),
         cmocka_unit_test(gram_of_every_list_length),
         cmocka_unit_test(fill_does_not_count),

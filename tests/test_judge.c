@@ -290,6 +290,7 @@ static size_t judge_twice(ovoid_context *context, ov_judge *kept, ov_judge *fres
 /* What a judge keeps of the last model has no part in what it says of the next: it is what a judge
  * made for that model alone says. Now and then it is stopped on the way. */
 static void the_last_model_is_forgotten(void **state) {
+    test_skip_simulated(*state); /* the kernels are those of march and distance */
     test_random random = {11};
     test_skip_simulated(*state); /* what is kept is the host's doing */
     countdown all = {.most = 1000000};
@@ -406,6 +407,7 @@ static void stopping(void **state) {
 /* Spheres too small or too large by 5 % in volume become equal in three steps, and no factor is
  * large, whatever the ratio. */
 static void factors_make_volumes_equal(void **state) {
+    test_skip_simulated(*state); /* what the host makes of volumes */
     const double decays[] = {0.5, 1.5}, isovalues[] = {1.0, 1.4};
     for (size_t n = 0; n < test_size(4, 1); ++n) {
         const double d = decays[n / 2], c = isovalues[n / 2];

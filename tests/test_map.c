@@ -274,6 +274,7 @@ static void maps_hold_the_field(void **state) {
 
 /* The room about the surface goes by the isovalue. */
 static void isovalue_sets_the_room(void **state) {
+    test_skip_simulated(context);
     subject s = model_subject(context);
     ovoid_export_options options;
     ovoid_export_options_init(&options, sizeof options);
@@ -338,6 +339,7 @@ static void large_maps_come_in_pieces(void **state) {
 
 /* Far from the origin, and on all sides of it: readers go by NXSTART, whatever the distance. */
 static void maps_far_out(void **state) {
+    test_skip_simulated(context);
     static const double at[][3] = {{150, -3, 12}, {-2000, 1, 3000.7}, {1e4, 1e4, -1e4}};
     ovoid_export_options options;
     ovoid_export_options_init(&options, sizeof options);
@@ -395,6 +397,7 @@ static void large_maps_are_asked_for(void **state) {
 
 /* The header of a map in a pipe cannot be completed at the end: it says so as MRC2014 asks. */
 static void pipes_get_no_statistics(void **state) {
+    test_skip_simulated(context);
     subject s = model_subject(context);
     ovoid_export_options options;
     char command[700];
@@ -415,6 +418,7 @@ static void pipes_get_no_statistics(void **state) {
 }
 
 static void failures_leave_nothing(void **state) {
+    test_skip_simulated(context);
     scratch *f = *state;
     subject s = model_subject(context);
     ovoid_export_options options;

@@ -465,18 +465,15 @@ static void twins_stay_apart(void **state) {
     destroy_model(&m);
 }
 
-/* Some are not to be merged, and everybody is found among the parents once. */
-static void fixed_ones_stay_and_parents_are_named(void **state) {
+/* Each ellipsoid is found among the parents once. */
+static void parents_are_named(void **state) {
     model m;
     const size_t count = test_size(24, 8);
     create_model(&m, *state, count, test_size(6, 20) / 10.0, 82);
-    bool *const fixed = test_alloc(count, sizeof *fixed);
     bool *const seen = test_alloc(count, sizeof *seen);
     uint32_t *const parents = test_alloc(2 * count, sizeof *parents);
     memset(seen, 0, count * sizeof *seen);
-    for (size_t i = 0; i < count; ++i)
-        fixed[i] = i % 4 == 1;
-    const ov_merging merging = {.fixed = fixed, .parents = parents};
+    const ov_merging merging = {.parents = parents};
     double *const x = copy_of(&m);
     size_t left = count;
     test_check(*state,
@@ -490,7 +487,7 @@ static void fixed_ones_stay_and_parents_are_named(void **state) {
             assert_memory_equal(x + i * P, m.x + a * P, P * sizeof *x);
             continue;
         }
-        assert_true(b < count && !seen[b] && !fixed[a] && !fixed[b]);
+        assert_true(b < count && !seen[b]);
         seen[b] = true;
         ov_quadric one, two, both, got;
         ov_factor_quadric(m.x + a * P, &one);
@@ -503,13 +500,6 @@ static void fixed_ones_stay_and_parents_are_named(void **state) {
     }
     for (size_t i = 0; i < count; ++i)
         assert_true(seen[i]);
-    memset(fixed, true, count * sizeof *fixed); /* all of them */
-    left = count;
-    memcpy(x, m.x, count * P * sizeof *x);
-    test_check(*state, ov_merge_cheapest(&m.refiner, &m.merger, &m.target, x, &left, 3, &merging));
-    assert_int_equal(left, count);
-    assert_memory_equal(x, m.x, count * P * sizeof *x);
-    free(fixed);
     free(seen);
     free(parents);
     free(x);
@@ -788,18 +778,12 @@ static void nothing_to_split(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(losses_equal_twin),
-        cmocka_unit_test(each_listed_pack_counts_once),
-        cmocka_unit_test(merging_keeps_moments),
-        cmocka_unit_test(cheapest_pairs_are_merged),
-        cmocka_unit_test(twins_stay_apart),
-        cmocka_unit_test(merges_lie_where_they_may),
-        cmocka_unit_test(nothing_to_merge),
-        cmocka_unit_test(fixed_ones_stay_and_parents_are_named),
-        cmocka_unit_test(crowd_at_one_point),
-        cmocka_unit_test(shares_add_up_to_the_misfit),
-        cmocka_unit_test(worst_are_split),
-        cmocka_unit_test(splits_of_every_shape),
+        cmocka_unit_test(losses_equal_twin),     cmocka_unit_test(each_listed_pack_counts_once),
+        cmocka_unit_test(merging_keeps_moments), cmocka_unit_test(cheapest_pairs_are_merged),
+        cmocka_unit_test(twins_stay_apart),      cmocka_unit_test(merges_lie_where_they_may),
+        cmocka_unit_test(nothing_to_merge),      cmocka_unit_test(parents_are_named),
+        cmocka_unit_test(crowd_at_one_point),    cmocka_unit_test(shares_add_up_to_the_misfit),
+        cmocka_unit_test(worst_are_split),       cmocka_unit_test(splits_of_every_shape),
         cmocka_unit_test(nothing_to_split),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);

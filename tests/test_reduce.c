@@ -611,12 +611,13 @@ static void a_search_asks_so_many_and_no_more(void **state) {
     }
 }
 
+static const ov_reduction_options usual_options = {.cost = OV_MERGE_L2, .reach = 5.0};
+
 static void what_is_no_gaussian_is_refused(void **state) {
     ovoid_context *context = *state;
     ov_quadric start[3];
     ov_reduction *reduction = NULL;
-    ov_reduction_options options;
-    ov_reduction_options_default(&options);
+    ov_reduction_options options = usual_options;
     random_atoms(51, 4.0, 0.0, start, 3);
     test_refused(context, ov_reduction_create(context, start, 0, 1, &options, &reduction),
                  OVOID_ERROR_EMPTY, "no Gaussian");
@@ -653,7 +654,7 @@ static void what_is_no_gaussian_is_refused(void **state) {
         test_refused(context, ov_reduction_create(context, start, 3, 1, &options, &reduction),
                      OVOID_ERROR_ARGUMENT, "reach");
     }
-    ov_reduction_options_default(&options);
+    options = usual_options;
     options.inside = -1.0;
     test_refused(context, ov_reduction_create(context, start, 3, 1, &options, &reduction),
                  OVOID_ERROR_ARGUMENT, "inside");

@@ -14,6 +14,13 @@
 #include <png.h>
 #include <unistd.h>
 
+/* The unit vector that a normal of ov_hits stands for. */
+static void unpack_normal(int32_t packed, double normal[3]) {
+    normal[0] = (int16_t)(uint16_t)((uint32_t)packed & 0xffffu) / 32767.0;
+    normal[1] = (int16_t)(uint16_t)((uint32_t)packed >> 16) / 32767.0;
+    normal[2] = sqrt(fmax(1.0 - normal[0] * normal[0] - normal[1] * normal[1], 0.0));
+}
+
 #define CUTOFF OV_PICTURE_CUTOFF
 
 /* ---- rays on the device --------------------------------------------------------------------- */
@@ -95,7 +102,7 @@ static void sphere_has_its_shape(void **state) {
                 continue;
             const double z = sqrt(radius * radius - away * away);
             double normal[3];
-            ov_unpack_normal(v.normal[at], normal);
+            unpack_normal(v.normal[at], normal);
             /* across the surface: along the ray nothing bounds the error at the rim */
             worst = fmax(worst, fabs(v.depth[at] - centre[2] - z) * z / radius);
             worst_normal = fmax(worst_normal, fabs(normal[0] - x / radius));
@@ -158,7 +165,7 @@ static void rays_are_the_references(void **state) {
                 const double point[3] = {x, y, z};
                 double wanted[3], got[3];
                 const double slope = reference_normal(quadrics, terms, point, wanted);
-                ov_unpack_normal(v.normal[at], got);
+                unpack_normal(v.normal[at], got);
                 expect_near(v.extra[at], slope, 1e-3 * slope + 1e-4, "the gradient's length");
                 for (int axis = 0; axis < 2; ++axis)
                     expect_near(got[axis], wanted[axis], 1e-3, "a normal");
@@ -238,7 +245,7 @@ static void ellipsoids_are_seen_singly(void **state) {
             memcpy(&index, &v.extra[at], sizeof index);
             assert_int_equal(index, which);
             reference_normal(&quadrics[which], 1, point, wanted);
-            ov_unpack_normal(v.normal[at], normal);
+            unpack_normal(v.normal[at], normal);
             expect_near(fabs(v.depth[at] - z) * wanted[2], 0.0, 1e-4, "an ellipsoid's depth");
             for (int axis = 0; axis < 2; ++axis)
                 expect_near(normal[axis], wanted[axis], 2e-3, "an ellipsoid's normal");

@@ -532,6 +532,7 @@ static void iterations_end(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_group_of_lane),
         cmocka_unit_test(twin_is_the_derivative),
         cmocka_unit_test(maps_equal_twin),
         cmocka_unit_test(blocks_equal_twin),

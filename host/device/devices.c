@@ -61,6 +61,11 @@ static cl_uint device_uint(cl_device_id id, cl_device_info what) {
     return clGetDeviceInfo(id, what, sizeof value, &value, NULL) == CL_SUCCESS ? value : 0;
 }
 
+/* For what decides on the use of a device: without an answer there is none. */
+static cl_int need_uint(cl_device_id id, cl_device_info what, cl_uint *value) {
+    return clGetDeviceInfo(id, what, sizeof *value, value, NULL);
+}
+
 static uint64_t device_ulong(cl_device_id id, cl_device_info what) {
     cl_ulong value = 0;
     return clGetDeviceInfo(id, what, sizeof value, &value, NULL) == CL_SUCCESS ? value : 0;
@@ -79,16 +84,23 @@ const char *ov_device_type_name(ovoid_device_type type) {
     return (unsigned)type < 4 ? names[type] : "other";
 }
 
-static void find_defect(ov_device_entry *entry) {
+static cl_int find_defect(ov_device_entry *entry) {
     int major = 0, minor = 0;
-    if (!device_uint(entry->id, CL_DEVICE_AVAILABLE))
+    cl_uint available = 0, compiler = 0;
+    cl_int code = need_uint(entry->id, CL_DEVICE_AVAILABLE, &available);
+    if (code == CL_SUCCESS)
+        code = need_uint(entry->id, CL_DEVICE_COMPILER_AVAILABLE, &compiler);
+    if (code != CL_SUCCESS)
+        return code;
+    if (!available)
         snprintf(entry->defect, sizeof entry->defect, "is not available at the moment");
-    else if (!device_uint(entry->id, CL_DEVICE_COMPILER_AVAILABLE))
+    else if (!compiler)
         snprintf(entry->defect, sizeof entry->defect, "has no OpenCL compiler");
     else if (sscanf(entry->info.opencl, "OpenCL %d.%d", &major, &minor) != 2 ||
              major * 100 + minor < 102)
         snprintf(entry->defect, sizeof entry->defect, "supports \"%.40s\"; OpenCL 1.2 is needed",
                  entry->info.opencl);
+    return CL_SUCCESS;
 }
 
 static cl_int describe(ov_device_entry *entry) {
@@ -99,6 +111,8 @@ static cl_int describe(ov_device_entry *entry) {
         code = device_text(id, CL_DEVICE_NAME, info->name, sizeof info->name);
     if (code == CL_SUCCESS)
         code = device_text(id, CL_DEVICE_VERSION, info->opencl, sizeof info->opencl);
+    if (code == CL_SUCCESS) /* the shape of kernels follows it */
+        code = need_uint(id, CL_DEVICE_PREFERRED_VECTOR_WIDTH_FLOAT, &info->float_width);
     if (code != CL_SUCCESS)
         return code;
     device_text(id, CL_DEVICE_VENDOR, info->vendor, sizeof info->vendor);
@@ -106,12 +120,10 @@ static cl_int describe(ov_device_entry *entry) {
     info->type = type_of(entry->type);
     info->compute_units = device_uint(id, CL_DEVICE_MAX_COMPUTE_UNITS);
     info->clock_mhz = device_uint(id, CL_DEVICE_MAX_CLOCK_FREQUENCY);
-    info->float_width = device_uint(id, CL_DEVICE_PREFERRED_VECTOR_WIDTH_FLOAT);
     info->fp64 = device_ulong(id, CL_DEVICE_DOUBLE_FP_CONFIG) != 0;
     info->global_memory = device_ulong(id, CL_DEVICE_GLOBAL_MEM_SIZE);
     info->max_allocation = device_ulong(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE);
-    find_defect(entry);
-    return CL_SUCCESS;
+    return find_defect(entry);
 }
 
 /* ---- once per process --------------------------------------------------------------------- */

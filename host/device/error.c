@@ -106,12 +106,17 @@ const char *ov_cl_name(cl_int code) {
     return "unknown OpenCL error";
 }
 
+ovoid_status ov_cl_status(cl_int code) {
+    return code == CL_OUT_OF_HOST_MEMORY || code == CL_MEM_OBJECT_ALLOCATION_FAILURE
+               ? OVOID_ERROR_MEMORY
+               : OVOID_ERROR_OPENCL;
+}
+
 ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call,
                            const char *kernel, const char *device) {
-    bool memory = code == CL_OUT_OF_HOST_MEMORY || code == CL_MEM_OBJECT_ALLOCATION_FAILURE;
-    return ov_fail(context, memory ? OVOID_ERROR_MEMORY : OVOID_ERROR_OPENCL, "%s: %s (%d)%s%s%s%s",
-                   call, ov_cl_name(code), (int)code, kernel ? ", kernel " : "",
-                   kernel ? kernel : "", device ? ", device " : "", device ? device : "");
+    return ov_fail(context, ov_cl_status(code), "%s: %s (%d)%s%s%s%s", call, ov_cl_name(code),
+                   (int)code, kernel ? ", kernel " : "", kernel ? kernel : "",
+                   device ? ", device " : "", device ? device : "");
 }
 
 ovoid_status ov_cl_fail(ovoid_context *context, cl_int code, const char *call, const char *kernel) {

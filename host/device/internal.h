@@ -8,6 +8,9 @@
 
 /* ---- errors ------------------------------------------------------------------------------- */
 
+/* OVOID_ERROR_MEMORY for the codes that stand for it, else OVOID_ERROR_OPENCL. */
+ovoid_status ov_cl_status(cl_int code);
+
 /* As ov_cl_fail() with the device's name given, for failures before the device is open. kernel and
  * device may be NULL. */
 ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call,

@@ -48,7 +48,7 @@ ovoid_status ov_launch(ovoid_context *context, const ov_kernel *kernel, size_t g
     for (size_t i = 0; i < arg_count; i++) {
         cl_int code = clSetKernelArg(kernel->handle, (cl_uint)i, args[i].size, args[i].value);
         if (code != CL_SUCCESS)
-            return ov_fail(context, OVOID_ERROR_OPENCL,
+            return ov_fail(context, ov_cl_status(code),
                            "clSetKernelArg: %s (%d), argument %zu of kernel %s, device %s",
                            ov_cl_name(code), (int)code, i, kernel->name,
                            context->device->info.name);
@@ -241,6 +241,8 @@ ovoid_status ov_later_end(ovoid_context *context, ov_later *later) {
     if (!later->event)
         return OVOID_OK;
     const cl_int code = clWaitForEvents(1, &later->event);
+    if (code != CL_SUCCESS) /* nothing may be written to memory that is about to be freed */
+        clFinish(context->device->queue);
     clReleaseEvent(later->event);
     later->event = NULL;
     return code == CL_SUCCESS ? OVOID_OK : ov_cl_fail(context, code, "clWaitForEvents", NULL);

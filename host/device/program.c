@@ -190,7 +190,7 @@ static ovoid_status fail_build(ovoid_context *context, const ov_device *device, 
     if (ov_full_disk(disk, sizeof disk - 1))
         strcat(disk, "\n");
     ovoid_status status =
-        ov_fail(context, OVOID_ERROR_OPENCL,
+        ov_fail(context, ov_cl_status(code),
                 "%sclBuildProgram: %s (%d), program %s.cl, device %s, driver %s\noptions: %s\n%s",
                 disk, ov_cl_name(code), (int)code, stem, device->info.name, device->info.driver,
                 options, log.length ? log.text : "(no build log)");
@@ -311,7 +311,7 @@ void ov_programs_release(ov_device *device) {
 /* ---- kernels ------------------------------------------------------------------------------ */
 
 static ovoid_status fail_create(ovoid_context *context, const ov_kernel *kernel, cl_int code) {
-    return ov_fail(context, OVOID_ERROR_OPENCL,
+    return ov_fail(context, ov_cl_status(code),
                    "clCreateKernel: %s (%d), kernel %s of %s.cl, device %s", ov_cl_name(code),
                    (int)code, kernel->name, kernel->program, context->device->info.name);
 }

@@ -388,7 +388,9 @@ ovoid_status ov_sample(ovoid_context *context, const double *xyzr, size_t atoms,
         s.origin[axis] =
             lattice->low[axis] + 0.5 * lattice->step[axis] * (double)lattice->size[axis];
     OV_TRY(ov_device_get(context, &device));
-    s.kept_limit = device->info.global_memory / BYTES_PER_POINT;
+    s.kept_limit = device->info.global_memory > 0 /* 0: the driver does not say */
+                       ? device->info.global_memory / BYTES_PER_POINT
+                       : UINT64_MAX;
     OV_TRY(
         ov_piece_grid_create(context, lattice, xyzr, atoms, decay, lowest(band) <= 0.0, &s.pieces));
     OV_TRY(check_empty_pieces(context, &s));

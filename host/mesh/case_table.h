@@ -6,11 +6,12 @@
 #ifndef OV_CASE_TABLE_H
 #define OV_CASE_TABLE_H
 
+#include "shared.h"
+
 #include <stdint.h>
 
 #define OV_CASES 256
 #define OV_CASE_TRIANGLES 5 /* the most that a case has */
-#define OV_CASE_BYTES 16    /* number of triangles, then three edges for each */
 
 /* Corner b of a cell lies at (b & 1, b >> 1 & 1, b >> 2) of its low corner, and bit b of a case
  * says that it is inside. An edge is the corner at its low end with its axis: corner + 8 * axis. */

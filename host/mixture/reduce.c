@@ -62,10 +62,6 @@ typedef struct reducer {
     double discount_max;
 } reducer;
 
-void ov_reduction_options_default(ov_reduction_options *options) {
-    *options = (ov_reduction_options){.cost = OV_MERGE_L2, .reach = 5.0, .inside = 0.0};
-}
-
 /* ---- the heap ----------------------------------------------------------------------------- */
 
 static bool comes_before(entry a, entry b) {

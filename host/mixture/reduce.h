@@ -28,9 +28,6 @@ typedef struct ov_reduction_options {
                       merged centre, so that merges deep inside come first; 0: they are not */
 } ov_reduction_options;
 
-/* L2, 5 angstrom, not divided. */
-void ov_reduction_options_default(ov_reduction_options *options);
-
 typedef struct ov_reduction ov_reduction;
 
 /* Reduces `start` (kept by copy) to `down_to` >= 1 Gaussians; a start of fewer stays as it is.

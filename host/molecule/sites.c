@@ -216,13 +216,18 @@ static bool is_selected(const ov_reader *reader, ov_selection *selection, size_t
     return ov_selection_matches(selection, &seen);
 }
 
+static ovoid_status fail_selection(ovoid_context *context, const char *error) {
+    return *error ? ov_fail(context, OVOID_ERROR_ARGUMENT, "selection: %s", error)
+                  : ov_fail(context, OVOID_ERROR_MEMORY, "out of memory for a selection");
+}
+
 ovoid_status ov_selection_check(ovoid_context *context, const char *text) {
     char error[256];
     if (!text)
         return OVOID_OK;
     ov_selection *selection = ov_selection_create(text, error, sizeof error);
     if (!selection)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "selection: %s", error);
+        return fail_selection(context, error);
     ov_selection_destroy(&selection);
     return OVOID_OK;
 }
@@ -232,7 +237,7 @@ static ovoid_status select_atoms(ov_reader *reader, unsigned char *keep) {
     char error[256];
     ov_selection *selection = ov_selection_create(reader->options->select, error, sizeof error);
     if (!selection)
-        return ov_fail(reader->context, OVOID_ERROR_ARGUMENT, "selection: %s", error);
+        return fail_selection(reader->context, error);
     for (size_t i = 0; i < m->atoms; i++) {
         keep[i] = is_selected(reader, selection, i);
         m->counts.skipped_selection += !keep[i];

@@ -120,7 +120,7 @@ ov_selection *ov_selection_create(const char *text, char *error, size_t size) {
     try {
         return new ov_selection{gemmi::Selection(text), {}, {}, {}};
     } catch (const std::bad_alloc &) {
-        std::snprintf(error, size, "out of memory");
+        std::snprintf(error, size, "%s", "");
     } catch (const std::exception &e) {
         copy_error(e.what(), error, size);
     } catch (...) {

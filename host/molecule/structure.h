@@ -52,8 +52,8 @@ typedef struct ov_selectable {
 
 typedef struct ov_selection ov_selection;
 
-/* Parses a selection in gemmi's syntax. NULL: it makes no sense or there is no memory; `error`
- * (`size` bytes) says which. */
+/* Parses a selection in gemmi's syntax. NULL: it makes no sense, and `error` (`size` bytes) says
+ * why, or there is no memory, and `error` is empty. */
 ov_selection *ov_selection_create(const char *text, char *error, size_t size);
 void ov_selection_destroy(ov_selection **selection);
 bool ov_selection_matches(ov_selection *selection, const ov_selectable *atom);

@@ -31,12 +31,6 @@ size_t ov_rays_index(const ov_rays *rays, uint32_t column, uint32_t row) {
     return block * OV_PACK + row % OV_BLOCK_Y * OV_BLOCK_X + column % OV_BLOCK_X;
 }
 
-void ov_unpack_normal(int32_t packed, double normal[3]) {
-    normal[0] = (int16_t)(uint16_t)((uint32_t)packed & 0xffffu) / 32767.0;
-    normal[1] = (int16_t)(uint16_t)((uint32_t)packed >> 16) / 32767.0;
-    normal[2] = sqrt(fmax(1.0 - normal[0] * normal[0] - normal[1] * normal[1], 0.0));
-}
-
 /* ---- boxes -------------------------------------------------------------------------------- */
 
 /* The part of the quadrics that rays can come by: depths from low to high, and the step that their

@@ -10,14 +10,7 @@
 #define OV_RAYS_H
 
 #include "field/field.h"
-
-/* Blocks of rays that make up a pack, as in kernels/render.cl. */
-#define OV_BLOCK_X 4
-#define OV_BLOCK_Y 4
-/* Steps of a ray within a slab. */
-#define OV_SLAB_STEPS 4
-/* Depth of a ray that meets nothing. */
-#define OV_NOWHERE (-1e30f)
+#include "shared.h"
 
 /* Ray (column, row) runs at x = left + column * spacing, y = top - row * spacing. */
 typedef struct ov_rays {
@@ -52,13 +45,10 @@ void ov_boxes_destroy(ov_boxes *boxes);
 /* What the rays meet first: one value per ray each. */
 typedef struct ov_hits {
     ov_buffer depth;  /* float: z, or OV_NOWHERE */
-    ov_buffer normal; /* int: ov_unpack_normal() */
+    ov_buffer normal; /* int: the outward unit vector's x and y, 16 bits each */
     ov_buffer extra;  /* depends on the operation */
 } ov_hits;
 void ov_hits_destroy(ov_hits *hits);
-
-/* The outward unit vector that a normal stands for. */
-void ov_unpack_normal(int32_t packed, double normal[3]);
 
 typedef struct ov_tracer {
     ov_kernel trace, ellipsoids, compare;

@@ -215,7 +215,7 @@ static bool may_merge(const merges *m, const ov_merging *how, uint32_t i, uint32
                       const double centre[3]) {
     uint32_t near[2 * OV_NEAR_MAX];
     return m->partner[i] == UINT32_MAX && m->partner[j] == UINT32_MAX &&
-           !(how->twin && how->twin[i] == j) && !(how->fixed && (how->fixed[i] || how->fixed[j])) &&
+           !(how->twin && how->twin[i] == j) &&
            !(how->apart > 0.0 && ov_grid_near(&m->grid, centre, UINT32_MAX, near) > 0) &&
            !(how->allowed && !how->allowed(centre, how->user));
 }

@@ -17,7 +17,6 @@ void ov_merger_destroy(ov_merger *merger);
 /* How to merge; NULL and NULL members: as one likes. */
 typedef struct ov_merging {
     const uint32_t *twin; /* ellipsoid i is not merged with twin[i] */
-    const bool *fixed;    /* and not at all if fixed[i] */
     double share;         /* of the pairs looked at: the cheapest; 0: all */
     double apart;         /* angstrom: the centres of two merges are no nearer than this */
     bool (*allowed)(const double centre[3], void *user); /* whether a merge may lie there */

@@ -1,0 +1,87 @@
+#!/bin/sh
+# mutations.sh [PATTERN]
+# Breaks the code in one place at a time and runs the test that is to notice: a mutation that it
+# notices is killed, one that it does not survives, and asks for a better test. Works on a copy of
+# the checkout below $TMPDIR, for minutes. Only mutations whose line below matches PATTERN, if given.
+# Writes CSV to standard output (bench/results/mutations.csv); fails if any survives or no longer
+# applies.
+set -u
+cd "$(dirname "$0")/.." || exit 1
+copy=$(mktemp -d) || exit 1
+trap 'rm -rf "$copy"' EXIT INT TERM
+git ls-files -z | xargs -0 cp --parents -t "$copy" || exit 1
+cmake -S "$copy" -B "$copy/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DOVOID_BUILD_BENCH=OFF \
+    >/dev/null || exit 1
+
+# File, test, what is broken, and how: a program for sed. Tests run with OVOID_TEST_SMALL=1; an `+`
+# before a test asks for full size, a `@16` after it for a device whose groups hold 16 at most.
+mutations() {
+    cat <<'LIST'
+host/measure/distance.c|distance|chunks half as far as the best are skipped|s/box_distance(box, m->box) > most/box_distance(box, m->box) > 0.25 * most/
+host/measure/distance.c|distance|chunks nearly as far as the best are skipped|s/box_distance(box, m->box) > most/box_distance(box, m->box) > 0.8 * most/
+host/fit/l1/l1.c|l1|no evaluation after a failed search|s/failures > 0) .*$/false)/
+host/fit/l1/l1.c|l1|a trial that is no model ends the fit|s/if (status != OVOID_ERROR_NUMERIC)/if (true)/
+host/fit/l1/objective.c|l1_objective|lists count as whole while they are built|/objective->listed_count = 0;/d
+host/fit/l1/objective.c|l1_objective|lists that failed count as whole|/if (status != OVOID_OK)/,/return status;/d
+host/device/open.c|device|a GPU is no better a default than a CPU|s/if (entries\[i\].info.type == OVOID_DEVICE_GPU)/if (false)/
+host/device/open.c|solver@16|groups are not fitted to the device|s/while (group > 1 \&\& group > device->max_group)/while (false)/
+host/device/open.c|gram@64|waves of 64 are not filled|s/wave_of(device) >= WAVE ? WAVE : WARP/WARP/
+host/device/launch.c|device|groups are not fitted to the kernel|s/if (local > kernel->max_group)/if (false)/
+host/device/launch.c|device|any group for a kernel compiled for one|s/if (kernel->group \&\& local != kernel->group)/if (false)/
+host/device/launch.c|device|a write under way is not copied|/memcpy(copy, data, bytes);/d
+host/device/launch.c|faults|a read that failed counts as done|s/return code == CL_SUCCESS ? idle(context)$/return true ? idle(context)/
+host/device/launch.c|faults|a write that failed counts as done|/bytes, copy ? copy : data, 0, NULL, NULL);/,/return ov_cl_fail/{/if (code/d;/return ov_cl_fail/d}
+host/device/program.c|faults|a kernel is lost where its limits are not told|s/^    clReleaseKernel(kernel->handle);$//
+host/device/error.c|faults|out of memory is any error|s/return code == CL_OUT_OF_HOST_MEMORY .*/return code == CL_SUCCESS/
+host/device/devices.c|faults|a device is what it did not say|s/return find_defect(entry);/find_defect(entry); return CL_SUCCESS;/
+host/molecule/sites.c|faults|out of memory is a bad selection|s/return \*error ? ov_fail/return true ? ov_fail/
+host/field/lists.c|l1_objective|lists cover a third of the skin|s|(skin + (double)points->rounding)|(skin / 3.0 + (double)points->rounding)|
+host/fit/adaptive/solver.c|solver|the tolerance of conjugate gradients|s/tolerance \* tolerance \* start/1e4 * tolerance * start/
+host/fit/adaptive/refine.c|refine|no bound of axes|s/^    ov_factor_bound_decay(to, least);//
+host/fit/adaptive/adaptive.c|+adaptive|calibration in the wrong direction|s/(1.0 - volume_ratio) \/ per_log/(volume_ratio - 1.0) \/ per_log/
+host/fit/adaptive/local.c|local|points are not found anew|s/m->escaped =$/m->escaped = false \&\&/
+host/fit/adaptive/merge.c|merge|a split forgets the variance|s/half.decay\[2\] \/= shrink;//
+host/measure/judge.c|judge|spots are not thinned|s/near = square < apart \* apart;/near = false;/
+host/mesh/mesh.c|mesh|walls of cavities are outer|s/mesh->component\[c\].outer = mesh->component\[c\].volume > 0.0;/mesh->component[c].outer = true;/
+host/mixture/reduce.c|reduce|partners that are used up are not looked for again|s/if (list->next == list->count \&\& list->more)/if (false)/
+host/molecule/pqr.c|molecule|a PDB file is not suspected|s/return !pdb->cleared \&\& atoms > 1/return false \&\& atoms > 1/
+host/write/ccp4.c|map|the deviation of a map|s/of->squares \/ points - mean \* mean/of->squares \/ points/
+LIST
+}
+
+try() {
+    file=$1 test=$2 what=$3 program=$4
+    limit=${test#*@}
+    [ "$limit" != "$test" ] || limit=
+    name=${test%@*}
+    small=1
+    case $name in +*) name=${name#+} small=0 ;; esac
+    cp "$copy/$file" "$copy/whole"
+    sed -i "$program" "$copy/$file"
+    if cmp -s "$copy/$file" "$copy/whole"; then
+        outcome=inapplicable
+    elif ! ninja -C "$copy/build" "test_$name" >"$copy/log" 2>&1; then
+        outcome=unbuildable
+    elif (
+        export OVOID_TEST_SMALL=$small
+        case $limit in
+        64) export OVOID_SHAPE=1x16 OVOID_TEST_GROUP=64 \
+            LD_PRELOAD="$copy/build/tests/lanes/libwave64.so" ;;
+        ?*) export POCL_MAX_WORK_GROUP_SIZE="$limit" OVOID_SHAPE=1x16 OVOID_TEST_GROUP="$limit" ;;
+        esac
+        timeout 600 "$copy/build/tests/test_$name" >"$copy/log" 2>&1
+    ); then
+        outcome=survived
+    else
+        outcome=killed
+    fi
+    cp "$copy/whole" "$copy/$file"
+    echo "$file,$test,$what,$outcome"
+}
+
+echo "file,test,mutation,outcome"
+ninja -C "$copy/build" wave64 >/dev/null || exit 1
+mutations | grep -e "${1:-.}" | while IFS='|' read -r file test what program; do
+    try "$file" "$test" "$what" "$program"
+done | tee "$copy/outcomes"
+grep -q . "$copy/outcomes" && ! grep -v ',killed$' "$copy/outcomes" >/dev/null

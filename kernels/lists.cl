@@ -306,6 +306,7 @@ __kernel void scan_lists(const uint terms_count, const uint groups, const uint4 
     turn_to_starts(bins, count, entries.x, fits, place);
     turn_to_starts(pairs, groups, grouped.x, fits, place ? place + count : place);
     turn_to_starts(terms, terms_count, items.x, fits, start);
+    barrier(CLK_GLOBAL_MEM_FENCE); /* all have read the chunks by now */
     if (get_local_id(0) > 0)
         return;
     if (start)

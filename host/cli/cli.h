@@ -201,7 +201,7 @@ void cli_profile_print(const cli_profile *profile, const char *whole, FILE *out)
  * null for what the driver does not tell. Nothing unless known. */
 bool cli_profile_report(const cli_profile *profile, cJSON *report);
 
-/* Adds what was counted at the device, under the names of ovoid_fit_profile. counts: by
+/* Adds what was counted at the device, under the names of ovoid_count. counts: by
  * ovoid_count. */
 bool cli_counts_report(const uint64_t counts[OVOID_COUNTS], cJSON *object);
 

@@ -1,4 +1,5 @@
 #include "mesh/mesh.h"
+#include "mesh/union.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -30,24 +31,6 @@ static void corners_at(const ovoid_mesh *mesh, size_t triangle, double *a, doubl
 
 /* ---- components --------------------------------------------------------------------------- */
 
-static uint32_t find_root(uint32_t *parent, uint32_t vertex) {
-    while (parent[vertex] != vertex) {
-        parent[vertex] = parent[parent[vertex]];
-        vertex = parent[vertex];
-    }
-    return vertex;
-}
-
-/* The smaller index becomes the root, so that a root is its component's first vertex. */
-static void unite(uint32_t *parent, uint32_t a, uint32_t b) {
-    a = find_root(parent, a);
-    b = find_root(parent, b);
-    if (a < b)
-        parent[b] = a;
-    else
-        parent[a] = b;
-}
-
 /* Fills component_of, components and the counts of component. */
 static ovoid_status find_components(ovoid_context *context, ovoid_mesh *mesh) {
     uint32_t *const of = mesh->component_of;
@@ -55,8 +38,8 @@ static ovoid_status find_components(ovoid_context *context, ovoid_mesh *mesh) {
         of[v] = (uint32_t)v;
     for (size_t t = 0; t < mesh->triangles; ++t) {
         const uint32_t *const corner = mesh->corners + 3 * t;
-        unite(of, corner[0], corner[1]);
-        unite(of, corner[0], corner[2]);
+        ov_unite(of, corner[0], corner[1]);
+        ov_unite(of, corner[0], corner[2]);
     }
     size_t count = 0;
     for (size_t v = 0; v < mesh->vertices; ++v)

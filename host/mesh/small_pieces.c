@@ -1,25 +1,9 @@
 #include "mesh/small_pieces.h"
+#include "mesh/union.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static uint32_t find_root(uint32_t *root, uint32_t vertex) {
-    while (root[vertex] != vertex) {
-        root[vertex] = root[root[vertex]];
-        vertex = root[vertex];
-    }
-    return vertex;
-}
-
-static void unite(uint32_t *root, uint32_t a, uint32_t b) {
-    a = find_root(root, a);
-    b = find_root(root, b);
-    if (a < b)
-        root[b] = a;
-    else
-        root[a] = b;
-}
 
 static int by_low(const void *a, const void *b) {
     const ov_small_piece *const p = a, *const q = b;
@@ -71,11 +55,11 @@ ovoid_status ov_small_pieces_find(ovoid_context *context,
     for (size_t v = 0; v < vertices; ++v)
         pieces->root[v] = (uint32_t)v;
     for (size_t t = 0; t < triangles; ++t) {
-        unite(pieces->root, corners[3 * t], corners[3 * t + 1]);
-        unite(pieces->root, corners[3 * t], corners[3 * t + 2]);
+        ov_unite(pieces->root, corners[3 * t], corners[3 * t + 1]);
+        ov_unite(pieces->root, corners[3 * t], corners[3 * t + 2]);
     }
     for (size_t v = 0; v < vertices; ++v) {
-        pieces->root[v] = find_root(pieces->root, (uint32_t)v);
+        pieces->root[v] = ov_union_first(pieces->root, (uint32_t)v);
         if (pieces->root[v] == v)
             number[v] = (uint32_t)pieces->count++;
     }

@@ -16,6 +16,11 @@ static struct {
     size_t refuse;
 } calls;
 
+static void forget_calls(void) {
+    free(calls.x);
+    memset(&calls, 0, sizeof calls);
+}
+
 ovoid_status __real_ov_l1_evaluate(ov_l1_objective *, const double *, size_t, ov_l1_evaluation *);
 ovoid_status __real_ov_l1_gradient(ov_l1_objective *, const double *, size_t, ov_l1_weights,
                                    double *);
@@ -562,7 +567,7 @@ static void refused_trials_are_rejected(void **state) {
         ovoid_fit_options options = options_for(4, 4);
         options.l1.first_step = OVOID_FIRST_STEP_GROW;
         options.l1.max_backtracks = backtracks;
-        memset(&calls, 0, sizeof calls);
+        forget_calls();
         calls.refuse_from = 2;
         calls.refuse = whole ? backtracks : 1;
         run_fit(*state, clump, ATOMS, &options, &run);
@@ -580,8 +585,7 @@ static void refused_trials_are_rejected(void **state) {
         }
         assert_true(r[2].l1.step > 0.0 && r[3].l1.step > 0.0);
         destroy_run(&run);
-        free(calls.x);
-        memset(&calls, 0, sizeof calls);
+        forget_calls();
     }
 }
 
@@ -650,5 +654,7 @@ int main(void) {
         cmocka_unit_test(ends_where_nothing_changes),
         cmocka_unit_test(result_is_the_last_record),
     };
-    return cmocka_run_group_tests(tests, test_open, test_close);
+    const int failed = cmocka_run_group_tests(tests, test_open, test_close);
+    forget_calls();
+    return failed;
 }

@@ -14,7 +14,8 @@ static int ascending(const void *a, const void *b) {
 
 size_t ov_packs_tidy(uint32_t *packs, size_t count) {
     size_t kept = 0;
-    qsort(packs, count, sizeof *packs, ascending);
+    if (count > 1) /* packs may be NULL where there are none */
+        qsort(packs, count, sizeof *packs, ascending);
     for (size_t n = 0; n < count; ++n)
         if (n == 0 || packs[n] != packs[n - 1])
             packs[kept++] = packs[n];

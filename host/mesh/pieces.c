@@ -291,14 +291,19 @@ void ov_pieces_destroy(ov_pieces *pieces) {
     memset(pieces, 0, sizeof *pieces);
 }
 
-size_t ov_pieces_find(const ov_pieces *pieces, uint64_t key) {
-    size_t low = 0, high = pieces->pieces;
+size_t ov_first_key(const uint64_t *keys, size_t count, uint64_t key) {
+    size_t low = 0, high = count;
     while (low < high) {
         const size_t middle = low + (high - low) / 2;
-        if (pieces->key[middle] < key)
+        if (keys[middle] < key)
             low = middle + 1;
         else
             high = middle;
     }
-    return low < pieces->pieces && pieces->key[low] == key ? low : pieces->pieces;
+    return low;
+}
+
+size_t ov_pieces_find(const ov_pieces *pieces, uint64_t key) {
+    const size_t at = ov_first_key(pieces->key, pieces->pieces, key);
+    return at < pieces->pieces && pieces->key[at] == key ? at : pieces->pieces;
 }

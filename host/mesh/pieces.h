@@ -46,6 +46,9 @@ ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, siz
                               const uint64_t limit[3], ov_pieces *pieces);
 void ov_pieces_destroy(ov_pieces *pieces);
 
+/* Position of the first of ascending keys that is this one or higher; count where there is none. */
+size_t ov_first_key(const uint64_t *keys, size_t count, uint64_t key);
+
 /* Position of the piece with this key among the pieces, or pieces->pieces. */
 size_t ov_pieces_find(const ov_pieces *pieces, uint64_t key);
 

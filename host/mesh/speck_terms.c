@@ -99,19 +99,6 @@ cleanup:
     return status;
 }
 
-/* Position of the first candidate with this key or a higher one. */
-static size_t find_key(const grid *g, uint64_t key) {
-    size_t low = 0, high = g->count;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (g->key[middle] < key)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* Called with the position in the grid of a candidate that may lie in the box. */
 typedef void visit_fn(size_t position, void *user);
 
@@ -131,8 +118,8 @@ static void visit_box(const grid *g, const double centre[3], const double half[3
     for (uint64_t z = from[2]; z <= to[2]; ++z)
         for (uint64_t y = from[1]; y <= to[1]; ++y) {
             const uint64_t last = key_of(to[0], y, z);
-            for (size_t k = find_key(g, key_of(from[0], y, z)); k < g->count && g->key[k] <= last;
-                 ++k)
+            for (size_t k = ov_first_key(g->key, g->count, key_of(from[0], y, z));
+                 k < g->count && g->key[k] <= last; ++k)
                 visit(k, user);
         }
 }

@@ -24,6 +24,7 @@ typedef struct ov_check {
     const char *name;
     const char *kernels; /* those that it looks at */
     bool brief;          /* part of the short form */
+    bool needed;         /* all that follow work with it: where it is wrong, they are left out */
     ovoid_status (*run)(ov_checking *checking);
 } ov_check;
 

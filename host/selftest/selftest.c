@@ -11,27 +11,28 @@
 #include <stdio.h>
 
 static const ov_check checks[] = {
-    {"layout", "layout", true, ov_check_layout},
-    {"lists", "packs_of_terms scan_lists hand_out_entries lists_of_packs", true, ov_check_lists},
-    {"field", "field field_polynomial field_gradient", true, ov_check_field},
-    {"moments", "moments gram", true, ov_check_moments},
-    {"misfit", "residual misfit", true, ov_check_misfit},
-    {"gather", "gather_points gather_target scatter_target", true, ov_check_gather},
-    {"spread", "spread", true, ov_check_spread},
-    {"merge", "merge_loss", true, ov_check_merge},
-    {"solver", "solve_start solve_product solve_update solve_direction solve_step", true,
+    {"layout", "layout", true, true, ov_check_layout},
+    {"lists", "packs_of_terms scan_lists hand_out_entries lists_of_packs", true, true,
+     ov_check_lists},
+    {"field", "field field_polynomial field_gradient", true, false, ov_check_field},
+    {"moments", "moments gram", true, false, ov_check_moments},
+    {"misfit", "residual misfit", true, false, ov_check_misfit},
+    {"gather", "gather_points gather_target scatter_target", true, false, ov_check_gather},
+    {"spread", "spread", true, false, ov_check_spread},
+    {"merge", "merge_loss", true, false, ov_check_merge},
+    {"solver", "solve_start solve_product solve_update solve_direction solve_step", true, false,
      ov_check_solver},
     {"mesh",
      "march_signs march_count march_get march_put march_vertices march_boxes march_triangles "
      "march_refine",
-     true, ov_check_mesh},
-    {"distances", "pack_leaves distances", true, ov_check_distances},
-    {"picture", "trace trace_ellipsoids compare shade", false, ov_check_picture},
-    {"many points", "field", false, ov_check_many_points},
+     true, false, ov_check_mesh},
+    {"distances", "pack_leaves distances", true, false, ov_check_distances},
+    {"picture", "trace trace_ellipsoids compare shade", false, false, ov_check_picture},
+    {"many points", "field", false, false, ov_check_many_points},
     {"many terms", "packs_of_terms scan_lists hand_out_entries lists_of_packs field moments gram",
-     false, ov_check_many_terms},
-    {"many distances", "distances", false, ov_check_many_distances},
-    {"fit", "all of a fit's", false, ov_check_fit},
+     false, false, ov_check_many_terms},
+    {"many distances", "distances", false, false, ov_check_many_distances},
+    {"fit", "all of a fit's", false, false, ov_check_fit},
 };
 enum { CHECKS = sizeof checks / sizeof *checks };
 
@@ -106,6 +107,14 @@ static void count(const ovoid_check *check, ovoid_selftest_result *result) {
     result->failed += check->verdict == OVOID_CHECK_FAILED;
 }
 
+static void tell(ovoid_context *context, const ovoid_check *check, ovoid_check_fn fn, void *user) {
+    if (!fn)
+        return;
+    ++context->calling;
+    fn(check, user);
+    --context->calling;
+}
+
 static ovoid_status run_all(ovoid_context *context, const ovoid_selftest_options *options,
                             ovoid_check_fn fn, void *user, ovoid_selftest_result *result) {
     for (size_t k = 0; k < CHECKS; ++k) {
@@ -119,11 +128,9 @@ static ovoid_status run_all(ovoid_context *context, const ovoid_selftest_options
         if (status != OVOID_OK)
             return status;
         count(&told, result);
-        if (!fn)
-            continue;
-        ++context->calling;
-        fn(&told, user);
-        --context->calling;
+        tell(context, &told, fn, user);
+        if (checks[k].needed && told.verdict != OVOID_CHECK_PASSED)
+            break;
     }
     return OVOID_OK;
 }

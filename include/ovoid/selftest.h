@@ -63,8 +63,9 @@ OVOID_API void ovoid_selftest_options_init(ovoid_selftest_options *options, size
 OVOID_API void ovoid_selftest_result_init(ovoid_selftest_result *result, size_t size);
 
 /* Runs all checks on the opened device, opening the default one if none is, whatever is remembered
- * of it and whatever one of them finds. OVOID_OK when they have run: result tells how many found
- * something wrong. options, fn and result may be NULL. */
+ * of it. OVOID_OK when they have run: result tells how many found something wrong. Where the layout
+ * of structures or the lists are wrong, the checks that follow, which work with them, are left out.
+ * options, fn and result may be NULL. */
 OVOID_API ovoid_status ovoid_selftest(ovoid_context *context, const ovoid_selftest_options *options,
                                       ovoid_check_fn fn, void *user, ovoid_selftest_result *result);
 

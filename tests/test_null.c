@@ -149,6 +149,7 @@ static void defaults(void **state) {
     DOES_NOTHING(ovoid_export_options_init, NULL, sizeof(ovoid_export_options));
     DOES_NOTHING(ovoid_scene_init, NULL, sizeof(ovoid_scene));
     DOES_NOTHING(ovoid_picture_options_init, NULL, sizeof(ovoid_picture_options));
+    ANSWERS(0, ovoid_sizeof, NULL);
 }
 
 /* Nothing can be NULL in a call of these. */

@@ -18,6 +18,8 @@ void ov_facets_round(const ov_facets *facets, const ovoid_mesh *mesh, const uint
     }
 }
 
+#define LEAF_BYTES (OV_TRIANGLE * OV_LEAF * sizeof(cl_float))
+
 /* Vertices are rounded so many at a time, so that the host holds few of them twice. */
 #define PIECE_VERTICES ((size_t)1 << 16)
 
@@ -80,8 +82,7 @@ ovoid_status ov_facets_load(ovoid_context *context, ov_facets *facets, bool coar
     OV_TRY(list_corners(context, facets, coarse, from, to, &corners));
     OV_TRY(ov_buffer_put(context, &facets->corners, corners, 3 * (to - from) * sizeof *corners,
                          "triangles of a mesh"));
-    OV_TRY(ov_buffer_reserve(context, &facets->packed,
-                             (end - first) * OV_TRIANGLE * OV_LEAF * sizeof(cl_float),
+    OV_TRY(ov_buffer_reserve(context, &facets->packed, (end - first) * LEAF_BYTES,
                              "triangles of a mesh"));
     OV_TRY(ov_buffer_reserve(context, &facets->leaf_boxes, (end - first) * BOX * sizeof(cl_float),
                              "boxes of triangles"));
@@ -118,14 +119,26 @@ cleanup:
     return status;
 }
 
+/* Leaves at a time, unless a test says how many. */
+static ovoid_status choose_chunk(ovoid_context *context, ov_facets *facets) {
+    ov_device *device;
+    const ovoid_status status = ov_device_get(context, &device);
+    if (status != OVOID_OK || facets->chunk > 0)
+        return status;
+    const size_t most =
+        (size_t)(OV_FACETS_SHARE * (double)device->info.global_memory / (double)LEAF_BYTES);
+    facets->chunk = most > OV_FACETS_CHUNK ? most : OV_FACETS_CHUNK;
+    return OVOID_OK;
+}
+
 ovoid_status ov_facets_set(ovoid_context *context, ov_facets *facets, const ov_trail *trail,
                            const double origin[3]) {
     ovoid_status status = OVOID_OK;
     facets->trail = *trail;
     memcpy(facets->origin, origin, sizeof facets->origin);
     facets->leaves = (trail->triangles + OV_LEAF - 1) / OV_LEAF;
-    facets->chunk = facets->chunk ? facets->chunk : OV_FACETS_CHUNK;
     facets->first = facets->end = 0;
+    OV_TRY(choose_chunk(context, facets));
     if (!facets->pack.handle)
         OV_TRY(ov_kernel_create(context, "distance", "pack_leaves", &facets->pack));
     OV_TRY(load_vertices(context, facets));

@@ -13,8 +13,11 @@
 #include "measure/trail.h"
 #include "shared.h"
 
-/* Leaves of OV_LEAF triangles on the device at a time (38 MB), no fewer than OV_GROUP. */
+/* Leaves of OV_LEAF triangles on the device at a time, no fewer than OV_GROUP: at least so many (38
+ * MB), or what this share of its memory holds, since a second chunk has all points looked at again.
+ */
 #define OV_FACETS_CHUNK ((size_t)1 << 15)
+#define OV_FACETS_SHARE (1.0 / 32.0)
 
 /* {0} is empty and holds no surface. What it has of kernels and memory serves the next surface. */
 typedef struct ov_facets {

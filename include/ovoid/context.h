@@ -56,6 +56,10 @@ OVOID_API const char *ovoid_status_name(ovoid_status status);
 OVOID_API const char *ovoid_version(void);
 OVOID_API uint32_t ovoid_abi(void);
 
+/* Bytes of a public structure in the library that is running, by the name of its type, such as
+ * "ovoid_fit_options"; 0 for other names. For bindings, which have no header to compile. */
+OVOID_API size_t ovoid_sizeof(const char *type);
+
 /* ---- context ------------------------------------------------------------------------------ */
 
 /* Holds the last error and, once opened, the device with its compiled programs and buffers. */

@@ -151,7 +151,7 @@ static void reach(const subject *s, ovoid_fitter *fitter, ovoid_field *original,
     ovoid_fit_result_init(&result, sizeof result);
     judgements = 0;
     ovoid_context_on_progress(s->context, go_on, NULL);
-    const ovoid_status status = ovoid_fitter_reach(s->context, fitter, options, &model, &result);
+    ovoid_fitter_reach(s->context, fitter, options, &model, &result);
     ovoid_context_on_progress(s->context, NULL, NULL);
     sum->judgements += judgements;
     if (!model) { /* given up, or a number that makes no sense */

@@ -178,6 +178,17 @@ static void molecules(void **state) {
     REFUSED(ovoid_molecule_create, context, NULL, xyzr, 1, &made);
     REFUSED(ovoid_molecule_create, xyzr, c, NULL, 1, &made);
     REFUSED(ovoid_molecule_create, molecule, c, xyzr, 1, NULL);
+    const ovoid_atom atom = {.name = "C"};
+    const ovoid_residue residue = {.name = "C"};
+    const ovoid_radii own = OVOID_RADII_OWN;
+#define KNOWN(argument, c, x, a, r, out)                                                           \
+    REFUSED(ovoid_molecule_create_known, argument, c, x, a, 1, r, 1, own, NULL, out)
+    KNOWN(context, NULL, xyzr, &atom, &residue, &made);
+    KNOWN(xyzr, c, NULL, &atom, &residue, &made);
+    KNOWN(identity, c, xyzr, NULL, &residue, &made);
+    KNOWN(residues, c, xyzr, &atom, NULL, &made);
+    KNOWN(molecule, c, xyzr, &atom, &residue, NULL);
+#undef KNOWN
     REFUSED(ovoid_molecule_expand, context, NULL, all.molecule);
     REFUSED(ovoid_molecule_expand, molecule, c, NULL);
     ANSWERS(0, ovoid_molecule_atoms, NULL);

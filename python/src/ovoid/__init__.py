@@ -12,11 +12,12 @@ Lengths are in Å, areas in Å², volumes in Å³, decays in Å⁻², angles in 
 from ._abi import lib as _lib
 from ._context import Context, Device, Progress, devices, use_device
 from ._field import Field
-from ._fit import Fitter, FitReport
+from ._fit import FitReport, Fitter
 from ._measure import Measures, Pair
 from ._mesh import Component, Distances, Mesh
 from ._model import Model, read_model
 from ._molecule import Assembly, Molecule, read
+from ._objects import from_arrays, molecule
 from ._picture import Image
 from .errors import (
     ArgumentError,
@@ -70,6 +71,8 @@ __all__ = [
     "Pair",
     "Progress",
     "devices",
+    "from_arrays",
+    "molecule",
     "read",
     "read_model",
     "use_device",

@@ -196,9 +196,7 @@ Distances = _structure(
     "ovoid_distances",
     *((name, c_double) for name in ("hausdorff", "forward", "backward", "mean", "rms")),
 )
-Pair = _structure(
-    "ovoid_pair", *((name, c_double) for name in ("original", "sparse", "error"))
-)
+Pair = _structure("ovoid_pair", *((name, c_double) for name in ("original", "sparse", "error")))
 MeasureOptions = _structure(
     "ovoid_measure_options",
     ("size", c_size_t),
@@ -289,6 +287,10 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "free": (None, [_P]),
     "molecule_read_with": (c_int, [_P, c_char_p, POINTER(ReadOptions), POINTER(_P)]),
     "molecule_create": (c_int, [_P, _P, c_size_t, POINTER(_P)]),
+    "molecule_create_known": (
+        c_int,
+        [_P, _P, _P, c_size_t, _P, c_size_t, c_int, c_char_p, POINTER(_P)],
+    ),
     "molecule_destroy": (None, [POINTER(_P)]),
     "molecule_atoms": (c_size_t, [_P]),
     "molecule_xyzr": (_P, [_P]),

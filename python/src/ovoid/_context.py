@@ -5,6 +5,8 @@ from __future__ import annotations
 import collections
 import ctypes
 import os
+import signal
+import sys
 import threading
 import time
 import warnings
@@ -12,6 +14,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any, Union
 
 from . import _drivers
@@ -19,7 +22,6 @@ from ._abi import UNKNOWN, DeviceInfo, ProgressFunction, WarningFunction, lib
 from ._abi import Progress as _Progress
 from .errors import (
     BY_STATUS,
-    CANCELLED,
     ArgumentError,
     DeviceError,
     FileError,
@@ -166,9 +168,7 @@ class _Bar:
         try:
             from tqdm.auto import tqdm
         except ImportError:
-            warnings.warn(
-                "progress=True needs tqdm: pip install tqdm", OvoidWarning, stacklevel=6
-            )
+            warnings.warn("progress=True needs tqdm: pip install tqdm", OvoidWarning, stacklevel=6)
             return None
         return _Bar(tqdm)
 
@@ -248,10 +248,11 @@ class Context:
 
     def _told_progress(self, address: int, _user: int) -> bool:
         try:
-            return True if self._watch is None else self._watch(address)
-        except BaseException as error:  # KeyboardInterrupt among them
+            if self._raised is None and self._watch is not None:
+                return self._watch(address)
+        except BaseException as error:
             self._raised = error
-            return False
+        return self._raised is None
 
     def _told_warning(self, text: bytes, _user: int) -> None:
         self._warned.append(text.decode("utf-8", "replace"))
@@ -269,19 +270,43 @@ class Context:
             self._raised = None
             self._running = True
             try:
-                status = function(self._handle, *arguments)
+                with self._signals():
+                    status = function(self._handle, *arguments)
             finally:
                 self._running = False
             self._warn()
-            if status:
+            if status or self._raised is not None:
                 self._fail(status)
+
+    @contextmanager
+    def _signals(self) -> Iterator[None]:
+        """What the handler of Ctrl-C raises meanwhile stops the call, and is raised after it: it
+        would be lost where it met the library in between."""
+        before = signal.getsignal(signal.SIGINT)
+        if not callable(before) or threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def handle(number: int, frame: FrameType | None) -> None:
+            try:
+                before(number, frame)
+            except BaseException as error:
+                self._raised = error
+
+        signal.signal(signal.SIGINT, handle)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
 
     def _create(self) -> None:
         if lib.context_create(ctypes.byref(self._handle)):
             raise MemoryError("ovoid: no memory for a context")
         lib.context_on_progress(self._handle, self._on_progress, None)
         lib.context_on_warning(self._handle, self._on_warning, None)
-        weakref.finalize(self, _destroy_context, self._handle.value, os.getpid()).atexit = False
+        address = self._handle.value
+        assert address is not None
+        weakref.finalize(self, _destroy, lib.context_destroy, address).atexit = False
 
     def _prepare(self) -> None:
         _drivers.prepare()
@@ -317,11 +342,10 @@ class Context:
 
     def _fail(self, status: int) -> None:
         raised, self._raised = self._raised, None
-        if raised is not None and not isinstance(raised, KeyboardInterrupt):
+        if isinstance(raised, KeyboardInterrupt):
+            raise Interrupted(*raised.args) from None
+        if raised is not None:
             raise raised
-        # A KeyboardInterrupt that came before the callback could catch it stops the work, too.
-        if status == CANCELLED and (raised or self._watch is None or not self._watch.asked):
-            raise Interrupted() from None
         text = lib.context_error(self._handle).decode("utf-8", "replace")
         raise BY_STATUS.get(status, OvoidError)(text)
 
@@ -354,14 +378,8 @@ class Context:
                 watch.close()
 
 
-def _destroy_context(address: int, _process: int) -> None:
-    lib.context_destroy(ctypes.byref(ctypes.c_void_p(address)))
-
-
 def _outside() -> int:
     """How far up the first caller outside this package is, for warnings."""
-    import sys
-
     here = os.path.dirname(os.path.abspath(__file__))
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and os.path.dirname(frame.f_code.co_filename) == here:
@@ -373,6 +391,7 @@ def _outside() -> int:
 _contexts: weakref.WeakSet[Context] = weakref.WeakSet()
 _default: Context | None = None
 _default_lock = threading.Lock()
+_local = threading.local()
 
 
 def default_context() -> Context:
@@ -382,6 +401,14 @@ def default_context() -> Context:
         if _default is None:
             _default = Context()
         return _default
+
+
+def host_context() -> Context:
+    """A context of this thread for what needs no device, so that it waits for no other thread."""
+    context: Context | None = getattr(_local, "context", None)
+    if context is None:
+        _local.context = context = Context()
+    return context
 
 
 def use_device(device: str | int | None) -> Device:

@@ -215,6 +215,4 @@ class Field:
             max_gigabytes=max_gigabytes,
         )
         with self.context._watching(progress):
-            self.context._call(
-                lib.field_export, self._pointer, encode(path), ctypes.byref(options)
-            )
+            self.context._call(lib.field_export, self._pointer, encode(path), ctypes.byref(options))

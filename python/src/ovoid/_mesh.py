@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from . import _abi
 from ._abi import lib
-from ._context import Context, Handle, ProgressLike, default_context, encode
+from ._context import Context, Handle, ProgressLike, default_context, encode, host_context
 from ._views import Doubles, doubles, view
 from .errors import ArgumentError
 
@@ -103,7 +103,7 @@ class Mesh:
             checked = doubles(normals, (len(places), 3), "normals")
             directions = np.ascontiguousarray(checked, np.float32)
         made = ctypes.c_void_p()
-        default_context()._call(
+        host_context()._call(
             lib.mesh_create,
             places.ctypes.data,
             None if directions is None else directions.ctypes.data,
@@ -225,7 +225,7 @@ class Mesh:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes a file by its extension: .ply, .obj, .stl, .off or .glb, whole or not at all."""
-        default_context()._call(lib.mesh_write, self._pointer, encode(path))
+        host_context()._call(lib.mesh_write, self._pointer, encode(path))
 
     def to_trimesh(self) -> Any:
         """A `trimesh.Trimesh` with copies of vertices, faces and normals."""

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._abi import lib
-from ._context import Context, Handle, ProgressLike, default_context, encode, is_missing
+from ._context import Context, Handle, ProgressLike, encode, host_context, is_missing
 from ._field import DECAY, ISOVALUE, SPACING, Field
 from ._measure import Measures, measure_fields
 from ._mesh import Mesh
@@ -107,7 +107,7 @@ class Model:
     def _make(self, table: Doubles, decay: float, isovalue: float) -> None:
         made = ctypes.c_void_p()
         array = np.ascontiguousarray(table)
-        default_context()._call(
+        host_context()._call(
             lib.model_create, array.ctypes.data, len(array), decay, isovalue, ctypes.byref(made)
         )
         assert made.value
@@ -130,7 +130,7 @@ class Model:
     def _annotate(self, key: str, value: str) -> None:
         clean = "".join("?" if ord(c) < 32 or ord(c) == 127 else c for c in value)
         raw = clean.encode("utf-8", "surrogateescape").replace(b"\0", b"?")
-        default_context()._call(lib.model_annotate, self._pointer, key.encode(), raw)
+        host_context()._call(lib.model_annotate, self._pointer, key.encode(), raw)
 
     @property
     def _pointer(self) -> ctypes.c_void_p:
@@ -210,7 +210,9 @@ class Model:
         """Array of float64, shape (n, 3): semi-axes (Å) of the surface on which the ellipsoid's own
         Gaussian is c; where it does not reach c, of that on which it has half its amplitude."""
         a = self.amplitudes
-        reach = np.where(a > self.isovalue, np.log(np.maximum(a, 1e-300) / self.isovalue), np.log(2))
+        reach = np.where(
+            a > self.isovalue, np.log(np.maximum(a, 1e-300) / self.isovalue), np.log(2)
+        )
         array: Doubles = _frozen(np.sqrt(reach[:, None] / self.decays))
         return array
 
@@ -238,7 +240,7 @@ class Model:
     @property
     def notes(self) -> dict[str, str]:
         """Header lines of its file, such as "settings"; the last one of a name counts."""
-        found = {}
+        found: dict[str, str] = {}
         index = 0
         while True:
             raw = lib.model_note(self._pointer, index)
@@ -385,7 +387,7 @@ class Model:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes a model file (.ovoid), whole or not at all."""
-        default_context()._call(lib.model_write, self._pointer, encode(path))
+        host_context()._call(lib.model_write, self._pointer, encode(path))
 
     def export(self, path: str | os.PathLike[str], **options: Any) -> None:
         """Writes a file for ChimeraX, PyMOL and others, or a map; see `Field.export`."""
@@ -432,7 +434,7 @@ def read_model(path: str | os.PathLike[str]) -> Model:
     made = ctypes.c_void_p()
     name = encode(path)
     try:
-        default_context()._call(lib.model_read, name, ctypes.byref(made))
+        host_context()._call(lib.model_read, name, ctypes.byref(made))
     except FileError as error:
         raise is_missing(error, name) from None
     assert made.value

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from . import _abi
 from ._abi import MOLECULE_COUNTS, lib
-from ._context import Context, Handle, ProgressLike, default_context, encode, is_missing
+from ._context import Context, Handle, ProgressLike, encode, host_context, is_missing
 from ._field import SPACING, Field
 from ._fit import Fitter, choice
 from ._mesh import Mesh
@@ -84,9 +84,7 @@ class Molecule:
             raise ArgumentError(f"there are {len(places)} atoms and {len(sizes)} radii")
         made = ctypes.c_void_p()
         both = np.column_stack([places, sizes])
-        default_context()._call(
-            lib.molecule_create, both.ctypes.data, len(both), ctypes.byref(made)
-        )
+        host_context()._call(lib.molecule_create, both.ctypes.data, len(both), ctypes.byref(made))
         assert made.value
         self._handle = Handle(made.value, lib.molecule_destroy)
         self._name: str | None = None
@@ -112,10 +110,11 @@ class Molecule:
         return int(lib.molecule_atoms(self._pointer))
 
     def __reduce__(self) -> Any:
-        if self.atoms is None:
-            return _restore, (np.array(self.xyz), np.array(self.radii), self._name)
-        radii = np.array(self.radii)
-        return _restore, (np.array(self.xyz), radii, self._name, *self._identity())
+        """A copy of its atoms with their radii; an assembly becomes atoms that nobody knows."""
+        plain = np.array(self.xyz), np.array(self.radii), self._name
+        if self.atoms is None or self.is_assembly:
+            return _restore, plain
+        return _restore, (*plain, np.array(self.atoms), np.array(self.residues))
 
     # ---- atoms ----
 
@@ -123,7 +122,7 @@ class Molecule:
     def xyzr(self) -> Doubles:
         """Array of float64, shape (n, 4): x, y, z and radius (Å), read-only."""
         if self.is_assembly:
-            default_context()._call(lib.molecule_expand, self._pointer)
+            host_context()._call(lib.molecule_expand, self._pointer)
         address = lib.molecule_xyzr(self._pointer)
         array: Doubles = view(address, np.float64, (len(self), 4), self._handle)
         return array
@@ -165,9 +164,6 @@ class Molecule:
             return None
         array: npt.NDArray[np.void] = view(address, _abi.RESIDUE, (count.value,), self._handle)
         return array
-
-    def _identity(self) -> tuple[Any, Any]:
-        return np.array(self.atoms), np.array(self.residues)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -384,12 +380,14 @@ class Molecule:
 def _restore(
     xyz: Any, radii: Any, name: str | None, atoms: Any = None, residues: Any = None
 ) -> Molecule:
-    molecule = Molecule(xyz, radii)
-    molecule._name = name
-    if atoms is not None:
-        molecule.__dict__["atoms"] = atoms
-        molecule.__dict__["residues"] = residues
-    return molecule
+    if atoms is None:
+        made = Molecule(xyz, radii)
+    else:
+        from ._objects import restore
+
+        made = restore(xyz, radii, atoms, residues)
+    made._name = name
+    return made
 
 
 def read(
@@ -458,12 +456,10 @@ def read(
         options.model = model
     name = encode(path)
     made = ctypes.c_void_p()
-    context = default_context()
+    context = host_context()
     try:
         with context._watching(progress):
-            context._call(
-                lib.molecule_read_with, name, ctypes.byref(options), ctypes.byref(made)
-            )
+            context._call(lib.molecule_read_with, name, ctypes.byref(options), ctypes.byref(made))
     except FileError as error:
         raise is_missing(error, name) from None
     assert made.value

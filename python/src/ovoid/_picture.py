@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from . import _abi
 from ._abi import lib
-from ._context import Handle, ProgressLike, default_context, encode
+from ._context import Handle, ProgressLike, encode, host_context
 from ._field import Field
 from ._views import view
 
@@ -45,7 +45,7 @@ class Image:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes a PNG file, whole or not at all."""
-        default_context()._call(lib.image_write, self._handle.pointer, encode(path))
+        host_context()._call(lib.image_write, self._handle.pointer, encode(path))
 
     def _repr_png_(self) -> bytes:
         with tempfile.TemporaryDirectory() as folder:

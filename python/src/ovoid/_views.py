@@ -46,7 +46,7 @@ def doubles(values: Any, shape: tuple[int | None, ...], name: str, unit: str = "
             given = np.asarray(values, np.float64) if given.dtype.kind == "O" else given
         if given.dtype.kind not in "fiu":
             raise TypeError(f"an array of {given.dtype}")
-        if np.ma.isMaskedArray(given) and np.ma.is_masked(given):
+        if isinstance(given, np.ma.MaskedArray) and np.any(given.mask):
             raise TypeError("an array with masked values")
         array: Doubles = np.ascontiguousarray(given, np.float64)
     except (TypeError, ValueError) as error:

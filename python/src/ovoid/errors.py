@@ -141,4 +141,3 @@ BY_STATUS: dict[int, type[OvoidError]] = {
     9: LimitError,
     10: NumericError,
 }
-CANCELLED = 8

@@ -65,6 +65,7 @@ static void structures_begin_with_their_size(void **state) {
     EXPECT_INIT(ovoid_measure_options, ovoid_measure_options_init);
     EXPECT_INIT(ovoid_measures, ovoid_measures_init);
     EXPECT_INIT(ovoid_export_options, ovoid_export_options_init);
+    EXPECT_INIT(ovoid_scene, ovoid_scene_init);
     EXPECT_INIT(ovoid_picture_options, ovoid_picture_options_init);
 }
 

@@ -480,16 +480,42 @@ static void formats_have_names(void **state) {
                  {".py", OVOID_EXPORT_PYMOL}, {"gmm", OVOID_EXPORT_GMM},
                  {"json", OVOID_EXPORT_JSON}, {"ccp4", OVOID_EXPORT_CCP4},
                  {".MRC", OVOID_EXPORT_CCP4}, {"map", OVOID_EXPORT_CCP4},
-                 {".dx", OVOID_EXPORT_DX},    {"", OVOID_EXPORT_AUTO},
+                 {".dx", OVOID_EXPORT_DX},    {"html", OVOID_EXPORT_HTML},
+                 {".htm", OVOID_EXPORT_HTML}, {"", OVOID_EXPORT_AUTO},
                  {".", OVOID_EXPORT_AUTO},    {"pdb", OVOID_EXPORT_AUTO},
                  {NULL, OVOID_EXPORT_AUTO},   {"a very long name", OVOID_EXPORT_AUTO}};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         assert_int_equal(ovoid_export_format_find(known[i].name), known[i].format);
-    for (int i = 1; i <= OVOID_EXPORT_DX; i++)
+    for (int i = 1; i <= OVOID_EXPORT_HTML; i++)
         assert_int_equal(ovoid_export_format_find(ovoid_export_format_name((ovoid_export_format)i)),
                          i);
     assert_null(ovoid_export_format_name(OVOID_EXPORT_AUTO));
-    assert_null(ovoid_export_format_name((ovoid_export_format)(OVOID_EXPORT_DX + 1)));
+    assert_null(ovoid_export_format_name((ovoid_export_format)(OVOID_EXPORT_HTML + 1)));
+}
+
+static void refuse_scene(const ovoid_scene *scene, const char *path, const char *text) {
+    test_refused(context, ovoid_scene_export(context, scene, path, NULL), OVOID_ERROR_ARGUMENT,
+                 text);
+}
+
+static void scenes_that_make_no_sense_are_refused(const char *path, const ovoid_model *model,
+                                                  const ovoid_molecule *molecule) {
+    const ovoid_model *const models[] = {model, NULL};
+    ovoid_scene s;
+    ovoid_scene_init(&s, sizeof s);
+    refuse_scene(&s, path, "neither a molecule nor a model");
+    s.molecule = molecule;
+    refuse_scene(&s, path, "fit a model to it first");
+    s.model_count = 2;
+    refuse_scene(&s, path, "without any");
+    s.models = models;
+    refuse_scene(&s, path, "model 2 of a scene is NULL");
+    s.model_count = 1;
+    s.decay = -1.0;
+    refuse_scene(&s, path, "decay -1");
+    s.decay = 0.0;
+    s.isovalue = NAN;
+    refuse_scene(&s, path, "isovalue");
 }
 
 static void what_makes_no_sense_is_refused(void **state) {
@@ -501,7 +527,7 @@ static void what_makes_no_sense_is_refused(void **state) {
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         test_refused(context, once_model_export(context, model, scratch_path(*state, bad[i]), NULL),
                      OVOID_ERROR_ARGUMENT,
-                     "one of .bild, .cxc, .py, .gmm, .json, .mrc, .map, .ccp4, .dx");
+                     "one of .bild, .cxc, .py, .gmm, .json, .mrc, .map, .ccp4, .dx, .html");
     test_refused(context, once_model_export(context, model, "-", NULL), OVOID_ERROR_ARGUMENT,
                  "name a format");
     const char *path = scratch_path(*state, "m.pdb");
@@ -515,17 +541,20 @@ static void what_makes_no_sense_is_refused(void **state) {
     test_refused(context, once_model_export(context, NULL, path, NULL), OVOID_ERROR_ARGUMENT,
                  "NULL");
     static const double wrong[] = {-1.0, NAN, INFINITY};
+    test_refused(context, once_model_export(context, model, scratch_path(*state, "m.html"), NULL),
+                 OVOID_ERROR_ARGUMENT, "ovoid_scene_export()");
     for (size_t i = 0; i < 3; i++) {
-        for (int which = 0; which < 4; which++) {
+        for (int which = 0; which < 5; which++) {
             ovoid_export_options o;
             ovoid_export_options_init(&o, sizeof o);
-            double *const value[] = {&o.isovalue, &o.spacing, &o.colour[2], &o.opacity};
-            static const char *const text[] = {"isovalue", "spacing", "colour", "opacity"};
+            double *const value[] = {&o.isovalue, &o.spacing, &o.colour[2], &o.opacity, &o.range};
+            static const char *const text[] = {"isovalue", "spacing", "colour", "opacity", "range"};
             *value[which] = wrong[i];
             test_refused(context, once_model_export(context, model, path, &o), OVOID_ERROR_ARGUMENT,
                          text[which]);
         }
     }
+    scenes_that_make_no_sense_are_refused(path, model, molecule);
     assert_int_equal(scratch_entries(*state), 0);
     ovoid_molecule_destroy(&molecule);
     ovoid_model_destroy(&model);

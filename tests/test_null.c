@@ -147,6 +147,7 @@ static void defaults(void **state) {
     DOES_NOTHING(ovoid_measures_init, NULL, sizeof(ovoid_measures));
     DOES_NOTHING(ovoid_measure_options_init, NULL, sizeof(ovoid_measure_options));
     DOES_NOTHING(ovoid_export_options_init, NULL, sizeof(ovoid_export_options));
+    DOES_NOTHING(ovoid_scene_init, NULL, sizeof(ovoid_scene));
     DOES_NOTHING(ovoid_picture_options_init, NULL, sizeof(ovoid_picture_options));
     ANSWERS(0, ovoid_sizeof, NULL);
 }
@@ -383,6 +384,11 @@ static void exports_and_pictures(void **state) {
     REFUSED(ovoid_field_export, context, NULL, all.field, "a.bild", NULL);
     REFUSED(ovoid_field_export, field, c, NULL, "a.bild", NULL);
     REFUSED(ovoid_field_export, path, c, all.field, NULL, NULL);
+    ovoid_scene scene;
+    ovoid_scene_init(&scene, sizeof scene);
+    REFUSED(ovoid_scene_export, context, NULL, &scene, "a.bild", NULL);
+    REFUSED(ovoid_scene_export, scene, c, NULL, "a.bild", NULL);
+    REFUSED(ovoid_scene_export, path, c, &scene, NULL, NULL);
     ANSWERS(OVOID_EXPORT_AUTO, ovoid_export_format_find, NULL);
     REFUSED(ovoid_render, context, NULL, all.field, all.field, &options, &made);
     REFUSED(ovoid_render, options, c, all.field, all.field, NULL, &made);

@@ -4,6 +4,8 @@
  */
 #include "scene.h"
 
+#include "fit/adaptive/constants.h"
+
 /* ---- the twin ----------------------------------------------------------------------------- */
 
 typedef enum zone { ZONE_OUTSIDE, ZONE_BAND, ZONE_INSIDE, ZONE_EDGE } zone;
@@ -309,7 +311,7 @@ static void emphasis_has_a_limit(void **state) {
                ov_target_emphasise(*state, &s.target, both[0].at, sizeof *both, 2, 100.0, 9.0));
     expect_target(&s, 1.0, factor);
     for (size_t k = 0; k < s.all; ++k)
-        factor[k] = OV_EMPHASIS_MAX;
+        factor[k] = (float)ov_tuned.spots_emphasis_max;
     for (int n = 0; n < 2; ++n) {
         test_check(*state,
                    ov_target_emphasise(*state, &s.target, middle.at, sizeof middle, 1, 100.0, 9.0));

@@ -171,7 +171,7 @@ typedef struct ov_source {
     const char *text;
 } ov_source;
 
-/* The embedded kernel sources, ended by a NULL name; made by cmake/EmbedKernels.cmake. */
+/* The embedded kernel sources, ended by a NULL name; made by cmake/EmbedTexts.cmake. */
 extern const ov_source ov_sources[];
 
 /* Releases all programs of the device, and their kernels. */

@@ -1,5 +1,5 @@
-# cmake -DSOURCES=<file;...> -DOUTPUT=<file.c> -P EmbedKernels.cmake
-# Writes a C file with the table ov_sources (host/device/internal.h) of each file's name and text.
+# cmake -DSOURCES=<file;...> -DOUTPUT=<file.c> -DHEADER=<header> -DTYPE=<type> -DTABLE=<name> -P EmbedTexts.cmake
+# Writes a C file with the table `const TYPE TABLE[]` of each file's name and text, as HEADER declares it.
 # Texts become arrays of bytes: a string literal would meet the limits on its length, and CMake's own
 # treatment of semicolons, brackets and backslashes.
 set(arrays "")
@@ -14,10 +14,10 @@ foreach(path IN LISTS SOURCES)
   string(APPEND rows "    {\"${name}\", (const char *)text_${index}},\n")
   math(EXPR index "${index} + 1")
 endforeach()
-file(WRITE "${OUTPUT}" "/* Made by EmbedKernels.cmake from the folder kernels. */
-#include \"device/internal.h\"
+file(WRITE "${OUTPUT}" "/* Made by EmbedTexts.cmake. */
+#include \"${HEADER}\"
 
-${arrays}const ov_source ov_sources[] = {
+${arrays}const ${TYPE} ${TABLE}[] = {
 ${rows}    {NULL, NULL},
 };
 ")

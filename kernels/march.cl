@@ -64,6 +64,15 @@ static inline corners load_corners(__global const uint *sign, uint brick, uint n
     return c;
 }
 
+/* Whether all points of a brick and its neighbours are on one side, as nearly everywhere. */
+static inline bool is_uniform(__global const uint *sign, uint brick, uint nx, uint ny) {
+    const uint row = nx + 1, layer = row * (ny + 1);
+    __global const uint *const s = sign + brick, *const t = s + layer;
+    const uint any = s[0] | s[1] | s[row] | s[row + 1] | t[0] | t[1] | t[row] | t[row + 1];
+    const uint all = s[0] & s[1] & s[row] & s[row + 1] & t[0] & t[1] & t[row] & t[row + 1];
+    return any == 0 || all == ALL;
+}
+
 /* Cells with corners on both sides. */
 static inline uint mixed_cells(const corners *c) {
     uint any = 0, all = ALL;
@@ -87,17 +96,19 @@ static inline uint lowest_bit(uint mask) {
 
 /* sign: bit j set where point j of a brick is inside, phi > c: a point where phi only touches c,
  * such as the centre of an atom of radius 0, has no surface about it. All bricks of the padded
- * grid. */
+ * grid, by place: brick_of. */
 __kernel void march_signs(const uint bricks, const uint run, const float isovalue,
-                          __global const uint *restrict place, __global const float *restrict value,
-                          __global uint *restrict sign) {
+                          __global const uint *restrict brick_of,
+                          __global const float *restrict value, __global uint *restrict sign) {
     const uint first = get_global_id(0) * run, end = min(first + run, bricks);
-    for (uint brick = first; brick < end; ++brick) {
-        __global const float *const v = value + (size_t)place[brick] * OV_PACK;
-        uint mask = 0;
-        for (uint j = 0; j < OV_PACK; ++j)
-            mask |= (v[j] > isovalue ? 1u : 0u) << j;
-        sign[brick] = mask;
+    const int16 bit = (int16)(1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7,
+                              1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15);
+    for (uint k = first; k < end; ++k) {
+        const int16 lane = (vload16(k, value) > isovalue) & bit;
+        const int8 eight = lane.lo | lane.hi;
+        const int4 four = eight.lo | eight.hi;
+        const int2 two = four.lo | four.hi;
+        sign[brick_of[k]] = (uint)(two.x | two.y);
     }
 }
 
@@ -112,6 +123,11 @@ __kernel void march_count(const uint nx, const uint ny, const uint nz, const uin
     const uint first = get_global_id(0) * run, end = min(first + run, bricks);
     for (uint k = first; k < end; ++k) {
         const uint brick = (k / (nx * ny) * (ny + 1) + k / nx % ny) * (nx + 1) + k % nx;
+        if (is_uniform(sign, brick, nx, ny)) {
+            crossing[brick] = (uint4)(0, 0, 0, 0);
+            found[place[brick]] = 0;
+            continue;
+        }
         const corners c = load_corners(sign, brick, nx, ny);
         uint count = 0;
         for (uint cells = mixed_cells(&c); cells; cells &= cells - 1)
@@ -218,9 +234,9 @@ static inline float keep_within(float t) {
  * search, as ln phi is quadratic about a single atom. */
 static inline float crossing_at(float a, float b, float isovalue, int logarithmic) {
     if (logarithmic) {
-        a = log(max(a, 1e-37f));
-        b = log(max(b, 1e-37f));
-        isovalue = log(isovalue);
+        a = log(max(a, 1e-37f) / isovalue);
+        b = log(max(b, 1e-37f) / isovalue);
+        isovalue = 0.0f;
     }
     const float t = (isovalue - a) / (b - a);
     return t >= 0.0f && t <= 1.0f ? t : 0.5f; /* not a number where phi overflows */

@@ -23,8 +23,8 @@ static void empty_box(float box[BOX]) {
 
 static void widen_box(float box[BOX], const float other[BOX]) {
     for (int k = 0; k < 3; ++k) {
-        box[k] = fminf(box[k], other[k]);
-        box[k + 3] = fmaxf(box[k + 3], other[k + 3]);
+        box[k] = other[k] < box[k] ? other[k] : box[k]; /* fminf() is a call */
+        box[k + 3] = other[k + 3] > box[k + 3] ? other[k + 3] : box[k + 3];
     }
 }
 
@@ -182,8 +182,8 @@ void ov_pack_box(const float *pack, float box[BOX]) {
         const float *const at = pack + axis * OV_PACK;
         box[axis] = box[axis + 3] = at[0];
         for (size_t k = 1; k < OV_PACK; ++k) {
-            box[axis] = fminf(box[axis], at[k]);
-            box[axis + 3] = fmaxf(box[axis + 3], at[k]);
+            box[axis] = at[k] < box[axis] ? at[k] : box[axis];
+            box[axis + 3] = at[k] > box[axis + 3] ? at[k] : box[axis + 3];
         }
     }
 }

@@ -76,6 +76,7 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     middle_of(xyzr, atoms, made.origin);
     OV_TRY(ov_marcher_create(context, &made.marcher));
     OV_TRY(mesh_original(&made, xyzr, atoms, decay));
+    ov_marcher_stay(made.marcher);
     if (made.mesh) {
         OV_TRY(ov_trail_create(context, made.mesh, false, &made.trail));
         OV_TRY(ov_facets_set(context, &made.facets, &made.trail, made.origin));

@@ -53,6 +53,7 @@ typedef struct ov_marcher {
     size_t new_vertices, new_triangles; /* of the piece */
 
     ov_brick_grid grid;
+    uint64_t wanted[3];  /* points of pieces, so that the grid stays; 0: nothing is wanted */
     double grid_spacing; /* angstrom */
     bool ghosts_empty;   /* on the device */
     ov_points points;
@@ -95,19 +96,16 @@ static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
     return status;
 }
 
-/* Where the bricks along the curve are in the padded grid. */
+/* Where the bricks are in the padded grid, by place. */
 static ovoid_status put_brick_numbers(ovoid_context *context, marcher *m) {
     const ov_brick_grid *const grid = &m->grid;
-    const uint64_t nx = grid->bricks[0], ny = grid->bricks[1];
-    cl_uint *const number = ov_alloc(context, grid->total, sizeof *number, "lattice bricks");
+    cl_uint *const number = ov_alloc(context, grid->padded_total, sizeof *number, "lattice bricks");
     if (!number)
         return OVOID_ERROR_MEMORY;
-    for (size_t k = 0; k < grid->total; ++k) {
-        const uint32_t brick = grid->curve[k];
-        number[k] = ov_brick_number(grid, brick % nx, brick / nx % ny, brick / (nx * ny));
-    }
-    const ovoid_status status = ov_buffer_put(context, &m->brick_of, number,
-                                              grid->total * sizeof *number, "lattice bricks");
+    for (size_t k = 0; k < grid->padded_total; ++k)
+        number[grid->place[k]] = (cl_uint)k;
+    const ovoid_status status = ov_buffer_put(
+        context, &m->brick_of, number, grid->padded_total * sizeof *number, "lattice bricks");
     free(number);
     return status;
 }
@@ -355,7 +353,7 @@ static ovoid_status classify(ovoid_context *context, marcher *m) {
     const cl_float isovalue = (cl_float)m->options->isovalue;
     const size_t scan = m->run > 1 ? 1 : OV_SCAN_GROUP;
     OV_TRY(OV_LAUNCH(context, &m->kernel[SIGNS], (padded + m->run - 1) / m->run, m->group,
-                     OV_ARG(padded), OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->place.memory),
+                     OV_ARG(padded), OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->brick_of.memory),
                      OV_ARG(m->value.memory), OV_ARG(m->sign.memory)));
     OV_TRY(OV_LAUNCH(context, &m->kernel[COUNT], (total + m->run - 1) / m->run, m->group,
                      OV_ARG(nx), OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->place.memory),
@@ -934,33 +932,41 @@ static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh)
     return OVOID_OK;
 }
 
-/* Where there are so many more pieces than ones with a surface, smaller pieces are tried; and what
- * a piece costs beside its points, in points. */
+/* Where there are so many more pieces than ones with a surface, small pieces are tried, and ones of
+ * a middle size where pieces have so many points that much of them may be empty; and what a piece
+ * costs beside its points, in points. */
 #define EMPTY_SHARE 8.0
-#define OVERHEAD 5e4
-static const uint64_t sparse_limits[][3] = {{64, 64, 32}, {32, 32, 16}, {16, 16, 8}};
+#define EMPTY_POINTS 2e6
+#define OVERHEAD 2e5
+static const uint64_t sparse_limits[][3] = {
+    {128, 128, 64}, {64, 64, 32}, {32, 32, 16}, {16, 16, 8}};
+
+static double points_of(const ov_pieces *pieces) {
+    return (double)pieces->size[0] * (double)pieces->size[1] * (double)pieces->size[2];
+}
 
 static double cost_of(const ov_pieces *pieces) {
-    return (double)pieces->pieces *
-           (OVERHEAD + (double)pieces->size[0] * (double)pieces->size[1] * (double)pieces->size[2]);
+    return (double)pieces->pieces * (OVERHEAD + points_of(pieces));
 }
 
 /* Cuts the lattice into pieces: small ones where terms are few and far apart. */
 static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
                          const uint64_t limit[3]) {
     ovoid_status status = OVOID_OK;
+    bool sparse;
     const ovoid_mesh_options *const o = m->options;
     const double cutoff = OV_MARCH_CUTOFF * o->isovalue;
     ov_pieces *const best = &m->pieces;
-    OV_TRY(
-        ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit, best));
-    if ((double)best->count[0] * (double)best->count[1] * (double)best->count[2] <=
-        EMPTY_SHARE * (double)best->pieces)
-        goto cleanup;
+    OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit,
+                            m->wanted, best));
+    sparse = (double)best->count[0] * (double)best->count[1] * (double)best->count[2] >
+             EMPTY_SHARE * (double)best->pieces;
     for (size_t k = 0; k < sizeof sparse_limits / sizeof *sparse_limits; ++k) {
         ov_pieces other;
+        if (k == 0 ? points_of(best) <= EMPTY_POINTS : !sparse)
+            continue;
         OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing,
-                                sparse_limits[k], &other));
+                                sparse_limits[k], m->wanted, &other));
         if (cost_of(&other) < cost_of(best)) {
             const ov_pieces swap = *best;
             *best = other;
@@ -1068,6 +1074,17 @@ ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **result) {
         return OVOID_ERROR_MEMORY;
     *result = made;
     return OVOID_OK;
+}
+
+/* Beyond what the last mesh took: models end here and there a step outside the original. */
+#define WANTED_MORE 8
+
+void ov_marcher_stay(ov_marcher *m) {
+    static const uint64_t limit[3] = OV_MARCH_PIECE;
+    for (size_t axis = 0; axis < 3 && m->grid.total > 0; ++axis) {
+        m->wanted[axis] = m->grid.bricks[axis] * brick_points[axis] + WANTED_MORE;
+        m->wanted[axis] = m->wanted[axis] < limit[axis] ? m->wanted[axis] : limit[axis];
+    }
 }
 
 void ov_marcher_destroy(ov_marcher **kept) {

@@ -39,6 +39,10 @@ typedef struct ov_marcher ov_marcher;
 ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **marcher);
 void ov_marcher_destroy(ov_marcher **marcher);
 
+/* The next meshes have pieces a little larger than the last one, where that is enough for them:
+ * then what depends on the size of pieces is not made anew each time. */
+void ov_marcher_stay(ov_marcher *marcher);
+
 /* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The light one knows its
  * components only after ov_mesh_finish(), so that the device can have something to do meanwhile;
  * normals: whether it is to have them. */

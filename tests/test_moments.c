@@ -54,6 +54,47 @@ static void expect_moments(bench *b, const float *u, double *worst, const char *
     free(weights);
 }
 
+/* A word on the device says whether there is anything to be done: what was there stays otherwise.
+ */
+static void idle_kernels_leave_results(void **state) {
+    bench b;
+    ov_buffer weights = {0}, moments = {0}, polynomial = {0}, value = {0}, word = {0};
+    test_random random = {12};
+    bench_random(&b, *state, MODEL_RANDOM, 3, 40, 300);
+    float *const u = random_weights(&random, &b);
+    const size_t size = 2 * b.terms_count * OV_MONOMIALS, values = b.points.packs * OV_PACK;
+    float *const mark = test_alloc(size + values, sizeof *mark);
+    for (size_t k = 0; k < size + values; ++k)
+        mark[k] = 7.0f;
+    write_floats(*state, &weights, u, values);
+    write_floats(*state, &polynomial, mark, b.terms_count * OV_MONOMIALS);
+    b.operations.idle = &word;
+    for (cl_uint idle = 0; idle < 2; ++idle) {
+        write_floats(*state, &moments, mark, size);
+        write_floats(*state, &value, mark, values);
+        test_check(*state, ov_buffer_put(*state, &word, &idle, sizeof idle, "a word"));
+        test_check(*state, ov_moments(*state, &b.operations, &b.points, &b.terms, &b.lists,
+                                      &weights, &moments));
+        test_check(*state, ov_field_polynomial(*state, &b.operations, &b.points, &b.terms, &b.lists,
+                                               &polynomial, NULL, &value));
+        float *const sums = read_floats(*state, &moments, size);
+        float *const got = read_floats(*state, &value, values);
+        for (size_t k = 0; k < size; ++k)
+            assert_true((sums[k] == 7.0f) == (idle == 1));
+        for (size_t k = 0; k < b.count; ++k)
+            assert_true((got[k] == 7.0f) == (idle == 1));
+        free(sums);
+        free(got);
+    }
+    b.operations.idle = NULL;
+    free(u);
+    free(mark);
+    ov_buffer *const buffers[] = {&weights, &moments, &polynomial, &value, &word};
+    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+        ov_buffer_destroy(buffers[k]);
+    bench_destroy(&b);
+}
+
 static void moments_equal_twin(void **state) {
     for (int place = 0; place < 2 * MODEL_KINDS; ++place) {
         const model_kind kind = (model_kind)(place % MODEL_KINDS);
@@ -317,6 +358,7 @@ static void residual_equals_twin(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(idle_kernels_leave_results),
         cmocka_unit_test(moments_equal_twin),
         cmocka_unit_test(moments_of_every_list_length),
         cmocka_unit_test(totals_hold_two_floats),

@@ -79,7 +79,8 @@ static const struct {
              SIZE(ovoid_mesh_options),  SIZE(ovoid_component),         SIZE(ovoid_distances),
              SIZE(ovoid_ellipsoid),     SIZE(ovoid_read_options),      SIZE(ovoid_molecule_counts),
              SIZE(ovoid_atom),          SIZE(ovoid_residue),           SIZE(ovoid_guess),
-             SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options)};
+             SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options),
+             SIZE(ovoid_scene)};
 #undef SIZE
 
 size_t ovoid_sizeof(const char *type) {

@@ -76,13 +76,14 @@ static void list_formats(char *text, size_t size, const char *between, const cha
     }
 }
 
-static bool is_map(ovoid_export_format format) {
-    return format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX;
+/* Formats of what is computed on the device. */
+static bool needs_device(ovoid_export_format format) {
+    return format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX || format == OVOID_EXPORT_HTML;
 }
 
-/* Formats that show a molecule and its models at once. */
-static bool is_scene(ovoid_export_format format) {
-    return format == OVOID_EXPORT_HTML;
+/* Models that a format takes beside a molecule; 0: it takes one input alone. */
+static size_t models_beside(ovoid_export_format format) {
+    return format == OVOID_EXPORT_HTML ? SIZE_MAX - 1 : format == OVOID_EXPORT_IHM;
 }
 
 void cli_export_help(FILE *stream) {
@@ -106,6 +107,15 @@ void cli_export_help(FILE *stream) {
         "  .py               ellipsoids for PyMOL, a script to run in it (as pymol)\n"
         "  .gmm              the Gaussian mixture of gmconvert and gmfit (as gmm)\n"
         "  .json             the model with axes and semi-axes, for scripts (as json)\n"
+        "  .xyz .extxyz      ellipsoids for OVITO, extended XYZ with semi-axes and orientations "
+        "(as\n"
+        "                    xyz)\n"
+        "  .lmp .data        ellipsoids for LAMMPS, data of atom style ellipsoid (as lammps)\n"
+        "  .pdb .ent         ellipsoids as pseudo-atoms with ANISOU, for Mol*, ChimeraX and PyMOL\n"
+        "                    (as anisou)\n"
+        "  .gltf             Gaussian splats, glTF with KHR_gaussian_splatting (as splat)\n"
+        "  .cif .mmcif       Gaussians in IHMCIF, the PDB's format of integrative models; with\n"
+        "                    MOLECULE and MODEL each says what residues it stands for (as ihm)\n"
         "  .mrc .map .ccp4   density map, MRC2014, 32-bit floats (as ccp4)\n"
         "  .dx               density map, OpenDX text as APBS writes it (as dx)\n"
         "  .html .htm        a page for a browser, in which the surfaces of molecule and model,\n"
@@ -214,10 +224,11 @@ static bool complete(int argc, char **argv, export_job *job) {
     }
     job->inputs = argv + optind;
     job->input_count = (size_t)(argc - optind);
-    if (job->input_count > 1 && !is_scene(format_of(job))) {
-        cli_error("one input at a time, but '%s' follows '%s': only a page (.html) shows several "
-                  "(see 'ovoid export --help')",
-                  job->inputs[1], job->inputs[0]);
+    const size_t beside = models_beside(format_of(job));
+    if (job->input_count > 1 + beside) {
+        cli_error("%s at a time, but '%s' follows '%s' (see 'ovoid export --help')",
+                  beside ? "a molecule and one model" : "one input", job->inputs[1 + beside],
+                  job->inputs[beside]);
         return false;
     }
     return check_inputs(job);
@@ -327,7 +338,7 @@ static int run(export_job *job) {
         return cli_failure(job->context, status, CLI_INPUT);
     if (!job->molecule && !reading_check_model(&job->reading, job->inputs[0]))
         return CLI_USAGE;
-    if (is_map(format_of(job)) || is_scene(format_of(job)))
+    if (needs_device(format_of(job)))
         status = ovoid_context_open_device(job->context, job->device);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);

@@ -4,6 +4,7 @@
 #include "base/progress.h"
 #include "base/sized.h"
 #include "model/fields.h"
+#include "write/ihm.h"
 #include "write/page.h"
 #include "write/scene.h"
 #include "write/text.h"
@@ -33,11 +34,16 @@ static const format formats[] = {
     [OVOID_EXPORT_JSON] = {"json", ".json", ov_write_json, NULL, 0, NULL},
     [OVOID_EXPORT_CCP4] = {"ccp4", ".mrc .map .ccp4", NULL, ov_write_ccp4, 4, NULL},
     [OVOID_EXPORT_DX] = {"dx", ".dx", NULL, ov_write_dx, 13, NULL},
+    [OVOID_EXPORT_XYZ] = {"xyz", ".xyz .extxyz", ov_write_xyz, NULL, 0, NULL},
+    [OVOID_EXPORT_LAMMPS] = {"lammps", ".lmp .data", ov_write_lammps, NULL, 0, NULL},
+    [OVOID_EXPORT_ANISOU] = {"anisou", ".pdb .ent", ov_write_anisou, NULL, 0, NULL},
+    [OVOID_EXPORT_SPLAT] = {"splat", ".gltf", ov_write_splat, NULL, 0, NULL},
+    [OVOID_EXPORT_IHM] = {"ihm", ".cif .mmcif", NULL, NULL, 0, ov_write_ihm},
     [OVOID_EXPORT_HTML] = {"html", ".html .htm", NULL, NULL, 0, ov_write_page},
 };
 enum { FORMATS = sizeof formats / sizeof *formats };
 
-#define ELLIPSOID_ENDINGS ".bild, .cxc, .py, .gmm, .json"
+#define ELLIPSOID_ENDINGS ".bild, .cxc, .py, .gmm, .json, .xyz, .lmp, .pdb, .gltf, .cif"
 #define MAP_ENDINGS ".mrc, .map, .ccp4, .dx"
 #define SCENE_ENDINGS ".html"
 
@@ -124,7 +130,7 @@ static ovoid_status choose_format(ovoid_context *context, const char *path,
                        "'%s' does not say what to write: its name would end in one of "
                        "%s" MAP_ENDINGS ", " SCENE_ENDINGS,
                        path, model ? ELLIPSOID_ENDINGS ", " : "");
-    if (!model && (*chosen)->ellipsoids)
+    if (!model && ((*chosen)->ellipsoids || which == OVOID_EXPORT_IHM))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "a molecule has no ellipsoids to write as %s: fit a model to it first, or "
                        "write a map (" MAP_ENDINGS ")",

@@ -1,7 +1,7 @@
 #include "write/page_blocks.h"
 
 #include "base/progress.h"
-#include "write/bytes.h"
+#include "write/base64.h"
 #include "write/export.h"
 
 #include <math.h>
@@ -12,26 +12,11 @@ enum { STEPS = 65535, NORMAL_STEPS = 1023, SCALAR_STEPS = 127 };
 
 /* ---- deflate and base64 ------------------------------------------------------------------- */
 
-static void write_base64(const unsigned char *data, size_t size, FILE *stream) {
-    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    ov_bytes bytes = {.stream = stream};
-    for (size_t i = 0; i < size && !ferror(stream); i += 3) {
-        const size_t left = size - i;
-        const uint32_t three = (uint32_t)data[i] << 16 |
-                               (left > 1 ? (uint32_t)data[i + 1] << 8 : 0u) |
-                               (left > 2 ? (uint32_t)data[i + 2] : 0u);
-        ov_put_u8(&bytes, (unsigned char)digits[three >> 18]);
-        ov_put_u8(&bytes, (unsigned char)digits[three >> 12 & 63]);
-        ov_put_u8(&bytes, left > 1 ? (unsigned char)digits[three >> 6 & 63] : '=');
-        ov_put_u8(&bytes, left > 2 ? (unsigned char)digits[three & 63] : '=');
-    }
-    ov_bytes_flush(&bytes);
-}
-
 ovoid_status ov_page_put_text(ovoid_context *context, const char *text, size_t length,
                               const char *id, FILE *stream) {
     ovoid_status status = OVOID_OK;
     uLongf size = compressBound((uLong)length);
+    ov_base64 text64 = {.stream = stream};
     unsigned char *packed = ov_alloc(context, size, 1, "a block of a page");
     if (!packed)
         return OVOID_ERROR_MEMORY;
@@ -39,7 +24,8 @@ ovoid_status ov_page_put_text(ovoid_context *context, const char *text, size_t l
     if (compress2(packed, &size, (const Bytef *)text, (uLong)length, Z_DEFAULT_COMPRESSION) != Z_OK)
         OV_TRY(ov_fail(context, OVOID_ERROR_MEMORY, "out of memory for a block of a page"));
     fprintf(stream, "<script type=\"application/octet-stream\" id=\"%s\">", id);
-    write_base64(packed, size, stream);
+    ov_base64_put(&text64, packed, size);
+    ov_base64_end(&text64);
     fputs("</script>\n", stream);
 cleanup:
     free(packed);

@@ -22,7 +22,13 @@ typedef enum ovoid_export_format {
     OVOID_EXPORT_CCP4, /* .mrc, .map, .ccp4: MRC2014, 32-bit floats */
     OVOID_EXPORT_DX,   /* .dx: OpenDX text as APBS writes it */
     /* and of a scene, a molecule and its models: */
-    OVOID_EXPORT_HTML /* .html, .htm: a page to turn them in, one file without network access */
+    OVOID_EXPORT_HTML, /* .html, .htm: a page to turn them in, one file without network access */
+    OVOID_EXPORT_IHM,  /* .cif, .mmcif: IHMCIF, the category ihm_gaussian_obj_site */
+    /* and more ellipsoids, of models: */
+    OVOID_EXPORT_XYZ,    /* .xyz, .extxyz: extended XYZ with semi-axes and orientations, OVITO's */
+    OVOID_EXPORT_LAMMPS, /* .lmp, .data: LAMMPS data of atom style ellipsoid */
+    OVOID_EXPORT_ANISOU, /* .pdb, .ent: pseudo-atoms with ANISOU */
+    OVOID_EXPORT_SPLAT   /* .gltf: glTF with KHR_gaussian_splatting */
 } ovoid_export_format;
 
 typedef struct ovoid_export_options {

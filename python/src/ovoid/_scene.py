@@ -34,6 +34,7 @@ class Scene:
     *models : Model
         Levels of detail, the finest first.
     title : str, optional
+        Default: the name of the molecule's file.
     context : Context, optional
 
     Examples
@@ -52,7 +53,8 @@ class Scene:
             raise ArgumentError("a scene needs a molecule or a model")
         self.molecule = molecule
         self.models = models
-        self.title = title
+        name = None if molecule is None else molecule._name
+        self.title = title or (os.path.basename(name) if name else None)
         self.context = context
 
     def __repr__(self) -> str:
@@ -105,7 +107,7 @@ class Scene:
             molecule=None if self.molecule is None else self.molecule._pointer,
             models=ctypes.cast(pointers, ctypes.POINTER(ctypes.c_void_p)) if self.models else None,
             model_count=len(self.models),
-            title=None if self.title is None else self.title.encode(),
+            title=None if self.title is None else self.title.encode("utf-8", "replace"),
         )
         context = self.context or default_context()
         with context._watching(progress):

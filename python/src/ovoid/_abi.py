@@ -76,6 +76,11 @@ DeviceInfo = _structure(
     ("fp64", c_bool),
     ("global_memory", c_uint64),
     ("max_allocation", c_uint64),
+    ("local_memory", c_uint64),
+    ("max_group", c_uint64),
+    ("pci", c_char * 16),
+    ("uuid", c_char * 40),
+    ("platform_version", c_char * 64),
 )
 ReadOptions = _structure(
     "ovoid_read_options",

@@ -357,7 +357,7 @@ class Context:
 
     def _discard(self, destroy: Any, address: int) -> None:
         self._graves.append((destroy, address))
-        if not self._running and self._lock.acquire(blocking=False):
+        if self._lock.acquire(blocking=False):
             try:
                 if not self._running:
                     self._bury()

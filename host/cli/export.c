@@ -249,6 +249,18 @@ static bool check_inputs(const export_job *job) {
     return streams <= 1;
 }
 
+static bool check_count(const export_job *job) {
+    const size_t beside = models_beside(format_of(job));
+    const bool molecule = !reading_is_model(&job->reading, job->inputs[0]);
+    const size_t most = molecule ? beside + 1 : beside > 1 ? SIZE_MAX : 1;
+    if (job->input_count <= most)
+        return true;
+    cli_error("%s at a time, but '%s' follows '%s' (see 'ovoid export --help')",
+              most > 1 ? "a molecule and one model" : "one input", job->inputs[most],
+              job->inputs[most - 1]);
+    return false;
+}
+
 static bool complete(int argc, char **argv, export_job *job) {
     if (optind == argc) {
         cli_error("which model? Name its file: ovoid export INPUT -o FILE "
@@ -262,14 +274,7 @@ static bool complete(int argc, char **argv, export_job *job) {
     }
     job->inputs = argv + optind;
     job->input_count = (size_t)(argc - optind);
-    const size_t beside = models_beside(format_of(job));
-    if (job->input_count > 1 + beside) {
-        cli_error("%s at a time, but '%s' follows '%s' (see 'ovoid export --help')",
-                  beside ? "a molecule and one model" : "one input", job->inputs[1 + beside],
-                  job->inputs[beside]);
-        return false;
-    }
-    return check_inputs(job);
+    return check_count(job) && check_inputs(job);
 }
 
 static bool parse_option(int option, export_job *job) {

@@ -68,6 +68,7 @@ wrong 2 "which model?"
 wrong 2 "one input at a time, but 'b' follows 'm.ovoid'" m.ovoid b -o m.py
 wrong 2 "a molecule and one model at a time, but 'n.ovoid' follows 'm.ovoid'" a.xyzr m.ovoid n.ovoid -o m.cif
 wrong 2 "--colour-by takes difference, chain, residue, ellipsoid or none, not 'atom'" a.xyzr -o a.ply --colour-by atom
+wrong 2 "one input at a time, but 'n.ovoid' follows 'm.ovoid'" m.ovoid n.ovoid -o m.ply
 wrong 2 "only one input can come from standard input" - - -o m.html
 wrong 2 "where to?" m.ovoid
 wrong 2 "are the same file" m.ovoid -o ./m.ovoid

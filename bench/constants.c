@@ -2,10 +2,10 @@
  * bench/constants: what each number that steers a method does (host/fit/adaptive/constants.def,
  * host/fit/l1/constants.def): it is halved and doubled, one at a time, in fits of several kinds.
  *
- *   constants [--only PREFIX]... MOLECULE...
+ *   constants [--only PREFIX]... [--after NAME] MOLECULE...
  *
  * Prints CSV: of every fit what it came to and what it took, counted, since that is the same on
- * every run. The fits:
+ * every run; deviation inf where it came to nothing. --after goes on after a constant. The fits:
  *   tolerance  to 0.5 angstrom
  *   number     half as many ellipsoids as that takes
  *   effort     the same with effort 2
@@ -137,6 +137,12 @@ static void add(const subject *s, ovoid_field *original, const ovoid_model *mode
     sum->volume_error = fmax(sum->volume_error, m.volume.error);
 }
 
+/* A search that goes on and on, as some numbers make it, is given up. */
+static bool go_on(const ovoid_progress *progress, void *user) {
+    (void)user;
+    return progress->iteration < 10000;
+}
+
 /* One fit by a fitter, whose model goes to *kept, if that is asked for. */
 static void reach(const subject *s, ovoid_fitter *fitter, ovoid_field *original,
                   const ovoid_fit_options *options, ovoid_model **kept, sums *sum) {
@@ -144,8 +150,14 @@ static void reach(const subject *s, ovoid_fitter *fitter, ovoid_field *original,
     ovoid_fit_result result;
     ovoid_fit_result_init(&result, sizeof result);
     judgements = 0;
-    stop(s, ovoid_fitter_reach(s->context, fitter, options, &model, &result));
+    ovoid_context_on_progress(s->context, go_on, NULL);
+    ovoid_fitter_reach(s->context, fitter, options, &model, &result);
+    ovoid_context_on_progress(s->context, NULL, NULL);
     sum->judgements += judgements;
+    if (!model) { /* given up, or a number that makes no sense */
+        sum->distance = INFINITY;
+        return;
+    }
     add(s, original, model, &result, sum);
     if (kept)
         *kept = model;
@@ -321,7 +333,7 @@ static const char *name_of(char *path) {
     return name;
 }
 
-static void try_all(ovoid_context *context, char *path, char **only, int count) {
+static void try_all(ovoid_context *context, char *path, char **only, int count, const char *after) {
     subject s = {.context = context, .name = path};
     stop(&s, ovoid_molecule_read(context, path, OVOID_MOLECULE_AUTO, &s.molecule));
     stop(&s, ovoid_field_of_molecule(context, s.molecule, OVOID_DEFAULT_DECAY,
@@ -330,9 +342,12 @@ static void try_all(ovoid_context *context, char *path, char **only, int count) 
     move(&s);
     for (fit_kind kind = 0; kind < KINDS; ++kind)
         run(&s, kind, "none", "", "");
-    for (const constant *c = constants; c < constants + CONSTANTS; ++c)
-        if (is_wanted(c->name, only, count))
+    for (const constant *c = constants; c < constants + CONSTANTS; ++c) {
+        if (!after && is_wanted(c->name, only, count))
             vary(&s, c);
+        if (after && strcmp(after, c->name) == 0)
+            after = NULL;
+    }
     ovoid_model_destroy(&s.model);
     ovoid_field_destroy(&s.field);
     ovoid_field_destroy(&s.moved_field);
@@ -343,11 +358,16 @@ static void try_all(ovoid_context *context, char *path, char **only, int count) 
 int main(int argc, char **argv) {
     ovoid_context *context = NULL;
     char *only[64];
+    const char *after = NULL;
     int count = 0, at = 1;
     for (; at + 1 < argc && strcmp(argv[at], "--only") == 0 && count < 64; at += 2)
         only[count++] = argv[at + 1];
+    if (at + 1 < argc && strcmp(argv[at], "--after") == 0) {
+        after = argv[at + 1];
+        at += 2;
+    }
     if (at >= argc) {
-        fputs("usage: constants [--only PREFIX]... MOLECULE...\n", stderr);
+        fputs("usage: constants [--only PREFIX]... [--after NAME] MOLECULE...\n", stderr);
         return 2;
     }
     const subject nobody = {.context = NULL};
@@ -356,7 +376,7 @@ int main(int argc, char **argv) {
     puts("constant,value,change,molecule,fit,ellipsoids,deviation,area_error,volume_error,steps,"
          "solver_iterations,judgements,launches");
     for (; at < argc; ++at)
-        try_all(context, argv[at], only, count);
+        try_all(context, argv[at], only, count, after);
     ovoid_context_destroy(&context);
     return 0;
 }

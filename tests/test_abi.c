@@ -67,6 +67,8 @@ static void structures_begin_with_their_size(void **state) {
     EXPECT_INIT(ovoid_export_options, ovoid_export_options_init);
     EXPECT_INIT(ovoid_scene, ovoid_scene_init);
     EXPECT_INIT(ovoid_picture_options, ovoid_picture_options_init);
+    EXPECT_INIT(ovoid_selftest_options, ovoid_selftest_options_init);
+    EXPECT_INIT(ovoid_selftest_result, ovoid_selftest_result_init);
 }
 
 /* A program of a later version: its structure is longer. */

@@ -107,6 +107,9 @@ static void contexts_and_devices(void **state) {
     ANSWERS(NULL, ovoid_context_device, NULL);
     ANSWERS(0, ovoid_context_count, NULL, OVOID_COUNT_LAUNCHES);
     REFUSED(ovoid_context_profile, context, NULL, true);
+    REFUSED(ovoid_selftest, context, NULL, NULL, NULL, NULL, NULL);
+    DOES_NOTHING(ovoid_selftest_options_init, NULL, sizeof(ovoid_selftest_options));
+    DOES_NOTHING(ovoid_selftest_result_init, NULL, sizeof(ovoid_selftest_result));
     REFUSED(ovoid_context_kernel_times, context, NULL, &times, &count);
     REFUSED(ovoid_context_kernel_times, times, c, NULL, &count);
     REFUSED(ovoid_context_kernel_times, count, c, &times, NULL);

@@ -66,6 +66,9 @@ AT(ovoid_measures, size, 0);
 AT(ovoid_export_options, size, 0);
 AT(ovoid_scene, size, 0);
 AT(ovoid_picture_options, size, 0);
+AT(ovoid_check, size, 0);
+AT(ovoid_selftest_options, size, 0);
+AT(ovoid_selftest_result, size, 0);
 
 #define SIZE(type)                                                                                 \
     { #type, sizeof(type) }
@@ -81,6 +84,7 @@ static const struct {
              SIZE(ovoid_ellipsoid),     SIZE(ovoid_read_options),      SIZE(ovoid_molecule_counts),
              SIZE(ovoid_atom),          SIZE(ovoid_residue),           SIZE(ovoid_guess),
              SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options),
+             SIZE(ovoid_check),         SIZE(ovoid_selftest_options),  SIZE(ovoid_selftest_result),
              SIZE(ovoid_scene)};
 #undef SIZE
 

@@ -297,6 +297,8 @@ static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const
     f->held = NULL;
     f->steps = 0;
     f->misfit = 0.0;
+    f->expected = 0.0;
+    f->width_max = ov_tuned.refine_width * sqrt(0.5 / options->decay);
     f->solver_before = ov_adaptive_solver_iterations(f);
     ov_refiner_forget(&f->refiner);
 }

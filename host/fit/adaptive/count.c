@@ -98,9 +98,24 @@ cleanup:
     return status;
 }
 
+/* Takes note of what can be expected of so many ellipsoids, if that is little. */
+static void expect(ov_adaptive *f, size_t count) {
+    const double most = ov_tuned.start_ratio * (double)f->atoms *
+                        pow(f->options->decay / 0.5, ov_tuned.start_decay_power);
+    const double distance = pow((double)count / most, 1.0 / ov_tuned.start_tolerance_power) *
+                            sqrt(2.0 * f->options->decay);
+    const double width = ov_tuned.coarse_width * cbrt((double)f->atoms / (double)count) *
+                         sqrt(0.5 / f->options->decay);
+    if (distance <= ov_tuned.coarse_distance)
+        return;
+    f->expected = distance;
+    f->width_max = fmin(f->width_max, width);
+}
+
 ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     ov_trial other = {0};
+    expect(f, count);
     if (is_near(f, count)) {
         OV_TRY(fit_start(f, count, best));
         if (best->count == count)

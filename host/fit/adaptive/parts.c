@@ -86,13 +86,15 @@ void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t) {
 }
 
 static ov_refine_options refine_options(ov_adaptive *f, uint32_t steps, double decrease) {
+    const bool coarse = f->expected > 0.0;
     return (ov_refine_options){
         .steps = steps < f->options->adaptive.steps ? steps : f->options->adaptive.steps,
         .solver_steps = ov_tuned.refine_solver_steps,
-        .solver_tolerance = ov_tuned.refine_solver_tolerance,
-        .decrease = decrease,
+        .solver_tolerance =
+            coarse ? ov_tuned.coarse_solver_tolerance : ov_tuned.refine_solver_tolerance,
+        .decrease = coarse ? fmax(decrease, ov_tuned.coarse_gain) : decrease,
         .damping = ov_tuned.refine_damping,
-        .width_max = ov_tuned.refine_width * sqrt(0.5 / f->options->decay),
+        .width_max = f->width_max,
         .go_on = report_step,
         .user = f,
     };
@@ -221,7 +223,9 @@ ovoid_status ov_adaptive_aim(ov_adaptive *f, size_t window) {
     } windows[OV_WINDOWS] = {{ov_tuned.target_window, ov_tuned.target_floor},
                              {ov_tuned.count_window_narrow, ov_tuned.count_floor_narrow},
                              {ov_tuned.count_window_wide, ov_tuned.count_floor_wide}};
-    OV_TRY(ov_target_window(f->context, &f->target, windows[window].width, windows[window].floor));
+    const double wide = fmin(ov_tuned.coarse_window * f->expected, ov_tuned.coarse_window_max);
+    OV_TRY(ov_target_window(f->context, &f->target, fmax(windows[window].width, wide),
+                            windows[window].floor));
     OV_TRY(ov_target_scale(f->context, &f->target, 1.0));
 cleanup:
     return status;

@@ -33,7 +33,9 @@ struct ov_adaptive {
     ov_local local;
     ov_merger merger;
     ov_judge judge;
-    double spacing; /* of the points */
+    double spacing;   /* of the points */
+    double expected;  /* distance of a coarse model, in units of 1 / sqrt(2 d); 0: of none */
+    double width_max; /* angstrom: no axis, 1 / sqrt(decay rate), becomes longer */
     const char *stage;
     uint64_t steps;         /* refinement steps so far */
     uint64_t solver_before; /* iterations of conjugate gradients before this search */

@@ -40,7 +40,7 @@ static ovoid_status start_and_grow(ov_adaptive *f, double tolerance, ov_trial *t
     OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
     while (f->options->adaptive.steps > 0 &&
            (double)spots.count > ov_tuned.start_too_many * count && count < (double)f->atoms) {
-        count = fmin(ceil(ov_tuned.start_again * count), (double)f->atoms);
+        count = fmin(ceil((1.0 + ov_tuned.start_more) * count), (double)f->atoms);
         OV_TRY(ov_adaptive_begin(f, 0, kinds, (size_t)count, t));
         OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
     }

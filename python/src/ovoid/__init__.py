@@ -19,6 +19,7 @@ from ._model import Model, read_model
 from ._molecule import Assembly, Molecule, read
 from ._objects import from_arrays, molecule
 from ._picture import Image
+from ._trajectory import FitTrajectory, SurfaceTrajectory, fit_trajectory, measure_trajectory
 from .errors import (
     ArgumentError,
     Cancelled,
@@ -52,6 +53,7 @@ __all__ = [
     "Field",
     "FileError",
     "FitReport",
+    "FitTrajectory",
     "Fitter",
     "FormatError",
     "GoalWarning",
@@ -70,8 +72,11 @@ __all__ = [
     "OvoidWarning",
     "Pair",
     "Progress",
+    "SurfaceTrajectory",
     "devices",
+    "fit_trajectory",
     "from_arrays",
+    "measure_trajectory",
     "molecule",
     "read",
     "read_model",

@@ -12,7 +12,7 @@ from pathlib import Path
 
 SYSTEM = "/etc/OpenCL/vendors"
 _VARIABLES = ("OCL_ICD_VENDORS", "OCL_ICD_FILENAMES", "OPENCL_VENDOR_PATH")
-# Distributions of PyPI that hold a driver which works, its library, and what that one needs besides.
+# Distributions of PyPI that hold a driver which works, its library, and what that one needs, too.
 _PACKAGED = (("intel-opencl-rt", "libintelocl.so", "intel-cmplr-lib-rt"),)
 
 _done = False

@@ -127,7 +127,8 @@ class Mesh:
 
     def __repr__(self) -> str:
         n, m = len(self.vertices), len(self.faces)
-        return f"<ovoid.Mesh of {n} vertices, {m} faces, {len(self.components)} pieces>"
+        pieces = f"{self.pieces} piece{'s' * (self.pieces != 1)}"
+        return f"<ovoid.Mesh of {n} vertices, {m} faces, {pieces}>"
 
     def __reduce__(self) -> Any:
         return Mesh, (np.array(self.vertices), np.array(self.faces), np.array(self.normals))
@@ -174,6 +175,11 @@ class Mesh:
             raw = lib.mesh_component(self._pointer, i).contents
             pieces.append(Component(*(getattr(raw, name) for name, _ in raw._fields_)))
         return pieces
+
+    @property
+    def pieces(self) -> int:
+        """How many connected pieces there are."""
+        return int(lib.mesh_components(self._pointer))
 
     @property
     def area(self) -> float:

@@ -56,18 +56,34 @@ def _numbers(values: Any, count: int) -> Any:
     return array.astype(np.int32)
 
 
+def _guess_elements(elements: Any, names: Any, residues: Any) -> Any:
+    """Elements from the names of atoms, for objects that hold none: the first letter, but for
+    ions, whose residue is called as the atom is."""
+    elements = np.array([e if e.isalpha() else b"" for e in elements.tolist()], elements.dtype)
+    if names is None or np.any(elements != b""):
+        return elements
+    guessed = elements.copy()
+    for i, (name, residue) in enumerate(zip(names, residues)):
+        letters = bytes(c for c in name if chr(c).isalpha())
+        ion = len(letters) == 2 and letters.upper() == residue.upper()
+        guessed[i] = letters if ion else letters[:1]
+    return guessed
+
+
 def _identity(given: _Atoms, count: int) -> tuple[Any, Any]:
-    """The library's arrays of atoms and residues. A residue ends where any of what it is called by
+    """The library's arrays of atoms and residues. A residue ends where what it is called by
     changes."""
     atoms = np.zeros(count, _abi.ATOM)
-    atoms["element"] = _text(given.elements, 2, count, "elements")
-    named = given.names if given.names is not None else given.elements
-    atoms["name"] = _text(named, 7, count, "names")
+    elements = _text(given.elements, 2, count, "elements")
+    names = None if given.names is None else _text(given.names, 7, count, "names")
+    residue_names = _text(given.residue_names, 7, count, "residue_names")
+    atoms["element"] = _guess_elements(elements, names, residue_names)
+    atoms["name"] = atoms["element"] if names is None else names
     atoms["serial"] = np.arange(1, count + 1)
     if given.hetero is not None:
         atoms["flags"] = np.where(np.asarray(given.hetero, bool), HETERO, 0)
     each = np.zeros(count, _abi.RESIDUE)
-    each["name"] = _text(given.residue_names, 7, count, "residue_names")
+    each["name"] = residue_names
     each["chain"] = _text(given.chains, 11, count, "chains")
     each["number"] = _numbers(given.residue_numbers, count)
     each["insertion"] = _text(given.insertions, 1, count, "insertions")
@@ -179,39 +195,19 @@ def _optional(group: Any, name: str) -> Any:
     return values if len(values) else None
 
 
-def _guess_elements(names: Any, residue_names: Any) -> list[str]:
-    """Elements from the names of atoms, for topologies that hold none: the first letter, but for
-    ions, whose residue is called as the atom is."""
-    guessed = []
-    for name, residue in zip(names, residue_names):
-        letters = "".join(c for c in str(name) if c.isalpha())
-        whole = str(residue).strip().upper() == letters.upper() and 1 < len(letters) <= 2
-        guessed.append(letters if whole else letters[:1])
-    return guessed
-
-
 def _mdanalysis(group: Any, frame: int | None) -> _Atoms:
     group = group.atoms
     if frame is not None:
         group.universe.trajectory[frame]
-    count = len(group)
-    names = _optional(group, "names")
-    residue_names = _optional(group, "resnames")
-    elements = _optional(group, "elements")
-    if elements is None or not any(str(e).strip() for e in elements):
-        if names is None:
-            raise ArgumentError("the topology holds neither elements nor names: give radii")
-        blank = [""] * count
-        elements = _guess_elements(names, residue_names if residue_names is not None else blank)
     chains = _optional(group, "chainIDs")
     if chains is None or not any(str(c).strip() for c in chains):
         chains = _optional(group, "segids")
     types = _optional(group, "record_types")
     return _Atoms(
         xyz=group.positions,
-        elements=elements,
-        names=names,
-        residue_names=residue_names,
+        elements=_optional(group, "elements"),
+        names=_optional(group, "names"),
+        residue_names=_optional(group, "resnames"),
         residue_numbers=_optional(group, "resids"),
         chains=chains,
         insertions=_optional(group, "icodes"),
@@ -292,8 +288,15 @@ def _rdkit(molecule: Any, frame: int | None) -> _Atoms:
 def _ase(atoms: Any, frame: int | None) -> _Atoms:
     if frame is not None:
         raise ArgumentError("Atoms of ASE have one frame")
-    symbols = [s.replace("X", "") if s == "X" else s for s in atoms.get_chemical_symbols()]
-    return _Atoms(xyz=atoms.get_positions(), elements=symbols)
+    symbols = ["" if s == "X" else s for s in atoms.get_chemical_symbols()]
+    known = atoms.arrays  # with names where they were read from a PDB file
+    return _Atoms(
+        xyz=atoms.get_positions(),
+        elements=symbols,
+        names=known.get("atomtypes"),
+        residue_names=known.get("residuenames"),
+        residue_numbers=known.get("residuenumbers"),
+    )
 
 
 # By the package that the object's class, or one that it derives from, comes from.

@@ -1,4 +1,4 @@
-#include "reference/distance.h"
+#include "selftest/twin_distance.h"
 
 #include <math.h>
 
@@ -37,8 +37,8 @@ static bool inside(const double *point, const double *a, const double *b, const 
     return dot(side, to) >= 0.0;
 }
 
-double reference_triangle_distance(const double point[3], const double a[3], const double b[3],
-                                   const double c[3]) {
+double ov_twin_triangle_distance(const double point[3], const double a[3], const double b[3],
+                                 const double c[3]) {
     double u[3], v[3], normal[3], to[3];
     subtract(b, a, u);
     subtract(c, a, v);
@@ -57,15 +57,15 @@ static bool left_out(const ovoid_mesh *mesh, const uint32_t *corner, bool outer_
     return outer_only && !ovoid_mesh_component(mesh, component)->outer;
 }
 
-double reference_mesh_distance(const double point[3], const ovoid_mesh *mesh, bool outer_only) {
+double ov_twin_mesh_distance(const double point[3], const ovoid_mesh *mesh, bool outer_only) {
     const double *const xyz = ovoid_mesh_xyz(mesh);
     double least = INFINITY;
     for (size_t t = 0; t < ovoid_mesh_triangles(mesh); ++t) {
         const uint32_t *const corner = ovoid_mesh_corners(mesh) + 3 * t;
         if (!left_out(mesh, corner, outer_only))
-            least = fmin(least, reference_triangle_distance(point, xyz + 3 * (size_t)corner[0],
-                                                            xyz + 3 * (size_t)corner[1],
-                                                            xyz + 3 * (size_t)corner[2]));
+            least = fmin(least, ov_twin_triangle_distance(point, xyz + 3 * (size_t)corner[0],
+                                                          xyz + 3 * (size_t)corner[1],
+                                                          xyz + 3 * (size_t)corner[2]));
     }
     return least;
 }
@@ -90,8 +90,8 @@ static sums one_way(const ovoid_mesh *from, const ovoid_mesh *to, bool outer_onl
         for (int k = 0; k < 3; ++k)
             centre[k] = xyz[3 * (size_t)corner[0] + (size_t)k] + (u[k] + v[k]) / 3.0;
         for (int i = 0; i < 4; ++i) {
-            const double d = reference_mesh_distance(i < 3 ? xyz + 3 * (size_t)corner[i] : centre,
-                                                     to, outer_only);
+            const double d =
+                ov_twin_mesh_distance(i < 3 ? xyz + 3 * (size_t)corner[i] : centre, to, outer_only);
             const double weight = area * (i < 3 ? 1.0 / 12.0 : 0.75);
             s.largest = fmax(s.largest, d);
             s.mean += weight * d;
@@ -102,7 +102,7 @@ static sums one_way(const ovoid_mesh *from, const ovoid_mesh *to, bool outer_onl
     return s;
 }
 
-ovoid_distances reference_distances(const ovoid_mesh *a, const ovoid_mesh *b, bool outer_only) {
+ovoid_distances ov_twin_distances(const ovoid_mesh *a, const ovoid_mesh *b, bool outer_only) {
     const sums forward = one_way(a, b, outer_only), backward = one_way(b, a, outer_only);
     return (ovoid_distances){
         .hausdorff = fmax(forward.largest, backward.largest),

@@ -1,4 +1,4 @@
-#include "reference/march.h"
+#include "selftest/twin_march.h"
 
 #include "mesh/case_table.h"
 
@@ -6,29 +6,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void *allocate(size_t count, size_t size) {
-    void *const memory = calloc(count > 0 ? count : 1, size);
-    if (!memory)
-        abort();
-    return memory;
-}
-
-static size_t point_number(const reference_mesh *mesh, const size_t at[3]) {
+static size_t point_number(const ov_twin_mesh *mesh, const size_t at[3]) {
     return (at[2] * mesh->size[1] + at[1]) * mesh->size[0] + at[0];
 }
 
-static void point_position(const reference_mesh *mesh, size_t point, double y[3]) {
+static void point_position(const ov_twin_mesh *mesh, size_t point, double y[3]) {
     for (int axis = 0; axis < 3; ++axis) {
         y[axis] = (double)(mesh->low[axis] + (int64_t)(point % mesh->size[axis])) * mesh->spacing;
         point /= mesh->size[axis];
     }
 }
 
-static size_t stride(const reference_mesh *mesh, unsigned axis) {
+static size_t stride(const ov_twin_mesh *mesh, unsigned axis) {
     return axis == 0 ? 1 : axis == 1 ? mesh->size[0] : mesh->size[0] * mesh->size[1];
 }
 
-static void add_vertex(reference_mesh *mesh, size_t point, unsigned axis, double isovalue) {
+static void add_vertex(ov_twin_mesh *mesh, size_t point, unsigned axis, double isovalue) {
     const double a = mesh->phi[point], b = mesh->phi[point + stride(mesh, axis)];
     if ((a > isovalue) == (b > isovalue))
         return;
@@ -39,7 +32,7 @@ static void add_vertex(reference_mesh *mesh, size_t point, unsigned axis, double
     mesh->softness[v] = mesh->spacing * fmax(a, b) / fabs(b - a);
 }
 
-static void add_cell(reference_mesh *mesh, const ov_case_table *table, size_t point,
+static void add_cell(ov_twin_mesh *mesh, const ov_case_table *table, size_t point,
                      double isovalue) {
     unsigned index = 0;
     size_t corner[8];
@@ -55,27 +48,31 @@ static void add_cell(reference_mesh *mesh, const ov_case_table *table, size_t po
     mesh->triangles += entry[0];
 }
 
-void reference_march(const ov_quadric *quadrics, size_t count, double isovalue, double spacing,
-                     const int64_t low[3], const size_t size[3], reference_mesh *mesh) {
+bool ov_twin_march(const ov_quadric *quadrics, size_t count, double isovalue, double spacing,
+                   const int64_t low[3], const size_t size[3], ov_twin_mesh *mesh) {
     const size_t points = size[0] * size[1] * size[2];
     size_t at[3];
     ov_case_table table;
     ov_case_table_make(&table);
-    *mesh = (reference_mesh){.spacing = spacing};
+    *mesh = (ov_twin_mesh){.spacing = spacing};
     memcpy(mesh->low, low, sizeof mesh->low);
     memcpy(mesh->size, size, sizeof mesh->size);
-    mesh->phi = allocate(points, sizeof *mesh->phi);
-    mesh->vertex = allocate(3 * points, sizeof *mesh->vertex);
-    mesh->xyz = allocate(9 * points, sizeof *mesh->xyz);
-    mesh->softness = allocate(3 * points, sizeof *mesh->softness);
-    mesh->corner = allocate(3 * OV_CASE_TRIANGLES * points, sizeof *mesh->corner);
+    mesh->phi = calloc(points, sizeof *mesh->phi);
+    mesh->vertex = calloc(3 * points, sizeof *mesh->vertex);
+    mesh->xyz = calloc(9 * points, sizeof *mesh->xyz);
+    mesh->softness = calloc(3 * points, sizeof *mesh->softness);
+    mesh->corner = calloc(3 * OV_CASE_TRIANGLES * points, sizeof *mesh->corner);
+    if (!mesh->phi || !mesh->vertex || !mesh->xyz || !mesh->softness || !mesh->corner) {
+        ov_twin_mesh_destroy(mesh);
+        return false;
+    }
     for (size_t p = 0; p < points; ++p) {
         double y[3];
         point_position(mesh, p, y);
-        mesh->phi[p] = reference_field(quadrics, count, y).value;
+        mesh->phi[p] = ov_twin_field(quadrics, count, y).value;
     }
     for (size_t k = 0; k < 3 * points; ++k)
-        mesh->vertex[k] = REFERENCE_NO_VERTEX;
+        mesh->vertex[k] = OV_TWIN_NO_VERTEX;
     for (at[2] = 0; at[2] < size[2]; ++at[2])
         for (at[1] = 0; at[1] < size[1]; ++at[1])
             for (at[0] = 0; at[0] < size[0]; ++at[0])
@@ -86,9 +83,10 @@ void reference_march(const ov_quadric *quadrics, size_t count, double isovalue, 
         for (at[1] = 0; at[1] + 1 < size[1]; ++at[1])
             for (at[0] = 0; at[0] + 1 < size[0]; ++at[0])
                 add_cell(mesh, &table, point_number(mesh, at), isovalue);
+    return true;
 }
 
-void reference_mesh_destroy(reference_mesh *mesh) {
+void ov_twin_mesh_destroy(ov_twin_mesh *mesh) {
     free(mesh->phi);
     free(mesh->vertex);
     free(mesh->xyz);

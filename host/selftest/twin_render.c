@@ -1,4 +1,4 @@
-#include "reference/render.h"
+#include "selftest/twin_render.h"
 
 #include <math.h>
 
@@ -16,23 +16,23 @@ static double term_at(const ov_quadric *q, const double y[3], double slope[3]) {
     return e;
 }
 
-double reference_sum_at(const ov_quadric *quadrics, size_t count, const double y[3]) {
+double ov_twin_sum_at(const ov_quadric *quadrics, size_t count, const double y[3]) {
     double sum = 0.0, unused[3];
     for (size_t i = 0; i < count; ++i)
         sum += term_at(&quadrics[i], y, unused);
     return sum;
 }
 
-double reference_hit(const ov_quadric *quadrics, size_t count, double level, double x, double y,
-                     double front, double back) {
+double ov_twin_hit(const ov_quadric *quadrics, size_t count, double level, double x, double y,
+                   double front, double back) {
     for (double z = front; z > back; z -= STEP) {
         const double here[3] = {x, y, z};
-        if (reference_sum_at(quadrics, count, here) < level)
+        if (ov_twin_sum_at(quadrics, count, here) < level)
             continue;
         double outer = z + STEP, inner = z;
         for (int k = 0; k < 40; ++k) {
             const double middle[3] = {x, y, 0.5 * (outer + inner)};
-            if (reference_sum_at(quadrics, count, middle) >= level)
+            if (ov_twin_sum_at(quadrics, count, middle) >= level)
                 inner = middle[2];
             else
                 outer = middle[2];
@@ -42,8 +42,8 @@ double reference_hit(const ov_quadric *quadrics, size_t count, double level, dou
     return -INFINITY;
 }
 
-double reference_hit_single(const ov_quadric *quadrics, size_t count, double level, double x,
-                            double y, size_t *which) {
+double ov_twin_hit_single(const ov_quadric *quadrics, size_t count, double level, double x,
+                          double y, size_t *which) {
     double first = -INFINITY;
     for (size_t i = 0; i < count; ++i) {
         const ov_quadric *const q = &quadrics[i];
@@ -64,8 +64,8 @@ double reference_hit_single(const ov_quadric *quadrics, size_t count, double lev
     return first;
 }
 
-double reference_normal(const ov_quadric *quadrics, size_t count, const double y[3],
-                        double normal[3]) {
+double ov_twin_normal(const ov_quadric *quadrics, size_t count, const double y[3],
+                      double normal[3]) {
     double sum[3] = {0.0, 0.0, 0.0};
     for (size_t i = 0; i < count; ++i) {
         double slope[3];
@@ -83,8 +83,8 @@ static double product(const double a[3], const float b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-void reference_light(const double colour[3], const double normal[3], const float key[4],
-                     const float fill[4], double ambient, double light[3]) {
+void ov_twin_light(const double colour[3], const double normal[3], const float key[4],
+                   const float fill[4], double ambient, double light[3]) {
     const float middle[3] = {key[0], key[1], key[2] + 1.0f};
     const double length =
         sqrt(middle[0] * middle[0] + middle[1] * middle[1] + middle[2] * middle[2]);

@@ -2,14 +2,14 @@
  * Marching cubes as it is usually written: phi in double at every point of a box of the lattice,
  * one cell after another, no pieces, no masks. With the same table of cases, linear vertices.
  */
-#ifndef REFERENCE_MARCH_H
-#define REFERENCE_MARCH_H
+#ifndef OV_TWIN_MARCH_H
+#define OV_TWIN_MARCH_H
 
-#include "reference/reference.h"
+#include "selftest/twin.h"
 
-#define REFERENCE_NO_VERTEX UINT32_MAX
+#define OV_TWIN_NO_VERTEX UINT32_MAX
 
-typedef struct reference_mesh {
+typedef struct ov_twin_mesh {
     int64_t low[3]; /* lattice indices of the box's first point */
     size_t size[3]; /* its points */
     double spacing;
@@ -21,11 +21,12 @@ typedef struct reference_mesh {
         *softness; /* how far a vertex moves along its edge per relative change of phi, angstrom */
     uint32_t *corner; /* 3 * triangles */
     size_t triangles;
-} reference_mesh;
+} ov_twin_mesh;
 
-/* The lattice of multiples of spacing, from `low` on. The surface must not leave the box. */
-void reference_march(const ov_quadric *quadrics, size_t count, double isovalue, double spacing,
-                     const int64_t low[3], const size_t size[3], reference_mesh *mesh);
-void reference_mesh_destroy(reference_mesh *mesh);
+/* The lattice of multiples of spacing, from `low` on. The surface must not leave the box. False
+ * without memory. */
+bool ov_twin_march(const ov_quadric *quadrics, size_t count, double isovalue, double spacing,
+                   const int64_t low[3], const size_t size[3], ov_twin_mesh *mesh);
+void ov_twin_mesh_destroy(ov_twin_mesh *mesh);
 
 #endif

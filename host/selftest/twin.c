@@ -1,4 +1,4 @@
-#include "reference/reference.h"
+#include "selftest/twin.h"
 
 #include <math.h>
 #include <string.h>
@@ -14,7 +14,7 @@ static void multiply(double a[3][3], double b[3][3], double product[3][3]) {
         }
 }
 
-void reference_rotation(const double angle[3], double r[3][3]) {
+void ov_twin_rotation(const double angle[3], double r[3][3]) {
     const double a = angle[0], b = angle[1], g = angle[2];
     double rx[3][3] = {{1, 0, 0}, {0, cos(a), -sin(a)}, {0, sin(a), cos(a)}};
     double ry[3][3] = {{cos(b), 0, -sin(b)}, {0, 1, 0}, {sin(b), 0, cos(b)}};
@@ -24,9 +24,9 @@ void reference_rotation(const double angle[3], double r[3][3]) {
     multiply(zy, rx, r);
 }
 
-double reference_ellipsoid(const ovoid_ellipsoid *ellipsoid, const double y[3]) {
+double ov_twin_ellipsoid(const ovoid_ellipsoid *ellipsoid, const double y[3]) {
     double r[3][3], q = 0.0;
-    reference_rotation(ellipsoid->angle, r);
+    ov_twin_rotation(ellipsoid->angle, r);
     for (int p = 0; p < 3; ++p) {
         double along = 0.0;
         for (int k = 0; k < 3; ++k)
@@ -58,14 +58,14 @@ static double form(double a[3][3], const double z[3]) {
     return q;
 }
 
-double reference_exponent(const ov_quadric *quadric, const double y[3]) {
+double ov_twin_exponent(const ov_quadric *quadric, const double y[3]) {
     double z[3], a[3][3];
     offset(quadric, y, z);
     full_matrix(quadric, a);
     return form(a, z);
 }
 
-void reference_monomials(const double z[3], double m[OV_MONOMIALS]) {
+void ov_twin_monomials(const double z[3], double m[OV_MONOMIALS]) {
     const double values[OV_MONOMIALS] = {
         1.0,         z[0],        z[1],        z[2],        z[0] * z[0],
         z[0] * z[1], z[0] * z[2], z[1] * z[1], z[1] * z[2], z[2] * z[2],
@@ -86,8 +86,8 @@ static double evaluate(const ov_quadric *quadric, const double y[3], double z[3]
     return quadric->amplitude * exp(-form(a, z));
 }
 
-reference_sum reference_field(const ov_quadric *quadrics, size_t count, const double y[3]) {
-    reference_sum sum = {0};
+ov_twin_sum ov_twin_field(const ov_quadric *quadrics, size_t count, const double y[3]) {
+    ov_twin_sum sum = {0};
     for (size_t i = 0; i < count; ++i) {
         double z[3], magnified;
         const double e = evaluate(&quadrics[i], y, z, &magnified);
@@ -97,13 +97,13 @@ reference_sum reference_field(const ov_quadric *quadrics, size_t count, const do
     return sum;
 }
 
-reference_sum reference_field_polynomial(const ov_quadric *quadrics, const float *polynomial,
-                                         size_t count, const double y[3]) {
-    reference_sum sum = {0};
+ov_twin_sum ov_twin_field_polynomial(const ov_quadric *quadrics, const float *polynomial,
+                                     size_t count, const double y[3]) {
+    ov_twin_sum sum = {0};
     for (size_t i = 0; i < count; ++i) {
         double z[3], m[OV_MONOMIALS], magnified;
         const double e = evaluate(&quadrics[i], y, z, &magnified);
-        reference_monomials(z, m);
+        ov_twin_monomials(z, m);
         for (size_t j = 0; j < OV_MONOMIALS; ++j) {
             const double part = e * polynomial[i * OV_MONOMIALS + j] * m[j];
             sum.value += part;
@@ -113,8 +113,8 @@ reference_sum reference_field_polynomial(const ov_quadric *quadrics, const float
     return sum;
 }
 
-void reference_gradient(const ov_quadric *quadrics, size_t count, const double y[3],
-                        reference_sum gradient[3]) {
+void ov_twin_gradient(const ov_quadric *quadrics, size_t count, const double y[3],
+                      ov_twin_sum gradient[3]) {
     memset(gradient, 0, 3 * sizeof *gradient);
     for (size_t i = 0; i < count; ++i) {
         double z[3], a[3][3], magnified;
@@ -129,13 +129,13 @@ void reference_gradient(const ov_quadric *quadrics, size_t count, const double y
     }
 }
 
-void reference_moments(const ov_quadric *quadric, const double *xyz, const double *u, size_t count,
-                       reference_sum moments[OV_MONOMIALS]) {
+void ov_twin_moments(const ov_quadric *quadric, const double *xyz, const double *u, size_t count,
+                     ov_twin_sum moments[OV_MONOMIALS]) {
     memset(moments, 0, OV_MONOMIALS * sizeof *moments);
     for (size_t k = 0; k < count; ++k) {
         double z[3], m[OV_MONOMIALS], magnified;
         const double ue = u[k] * evaluate(quadric, xyz + 3 * k, z, &magnified);
-        reference_monomials(z, m);
+        ov_twin_monomials(z, m);
         for (size_t j = 0; j < OV_MONOMIALS; ++j) {
             moments[j].value += ue * m[j];
             moments[j].scale += fabs(ue * m[j]) * magnified;
@@ -143,8 +143,8 @@ void reference_moments(const ov_quadric *quadric, const double *xyz, const doubl
     }
 }
 
-void reference_gram(const ov_quadric *quadric, const double *xyz, const double *w, size_t count,
-                    reference_sum gram[OV_GRAM]) {
+void ov_twin_gram(const ov_quadric *quadric, const double *xyz, const double *w, size_t count,
+                  ov_twin_sum gram[OV_GRAM]) {
     memset(gram, 0, OV_GRAM * sizeof *gram);
     for (size_t k = 0; k < count; ++k) {
         double z[3], magnified, power[3][5];
@@ -199,7 +199,7 @@ static bool solve(double a[3][3], const double b[3], const int *use, int n, doub
     return true;
 }
 
-double reference_least_exponent(const ov_quadric *quadric, const double box[6]) {
+double ov_twin_least_exponent(const ov_quadric *quadric, const double box[6]) {
     double a[3][3], low[3], high[3], least = INFINITY;
     full_matrix(quadric, a);
     offset(quadric, box, low);
@@ -233,7 +233,7 @@ double reference_least_exponent(const ov_quadric *quadric, const double box[6]) 
     return least;
 }
 
-double reference_phi(const double *xyzr, size_t atoms, double decay, const double y[3]) {
+double ov_twin_phi(const double *xyzr, size_t atoms, double decay, const double y[3]) {
     double sum = 0.0;
     for (size_t i = 0; i < atoms; ++i) {
         const double *const a = xyzr + 4 * i;
@@ -245,14 +245,14 @@ double reference_phi(const double *xyzr, size_t atoms, double decay, const doubl
     return sum;
 }
 
-double reference_residual(double value, double target, double limit) {
+double ov_twin_residual(double value, double target, double limit) {
     if (target > limit)
         return value < limit ? value - limit : 0.0;
     return value - target;
 }
 
-double reference_accuracy(const double *parameters, size_t ellipsoids, const double *xyz,
-                          const double *target, size_t points, double limit) {
+double ov_twin_accuracy(const double *parameters, size_t ellipsoids, const double *xyz,
+                        const double *target, size_t points, double limit) {
     double sum = 0.0;
     for (size_t k = 0; k < points; ++k) {
         double field = 0.0;
@@ -264,15 +264,15 @@ double reference_accuracy(const double *parameters, size_t ellipsoids, const dou
                 .centre = {p[4], p[5], p[6]},
                 .angle = {p[7], p[8], p[9]},
             };
-            field += reference_ellipsoid(&ellipsoid, xyz + 3 * k);
+            field += ov_twin_ellipsoid(&ellipsoid, xyz + 3 * k);
         }
-        const double residual = reference_residual(field, target[k], limit);
+        const double residual = ov_twin_residual(field, target[k], limit);
         sum += residual * residual;
     }
     return sum;
 }
 
-double reference_sparsity(const double *parameters, size_t ellipsoids) {
+double ov_twin_sparsity(const double *parameters, size_t ellipsoids) {
     double sum = 0.0;
     for (size_t i = 0; i < ellipsoids; ++i)
         for (size_t j = 0; j < 4; ++j)
@@ -280,20 +280,20 @@ double reference_sparsity(const double *parameters, size_t ellipsoids) {
     return sum;
 }
 
-void reference_gather(const uint32_t *list, size_t packs, size_t size, const float *all,
-                      float *some) {
+void ov_twin_gather(const uint32_t *list, size_t packs, size_t size, const float *all,
+                    float *some) {
     for (size_t n = 0; n < packs; ++n)
         for (size_t k = 0; k < size; ++k)
             some[n * size + k] = all[list[n] * size + k];
 }
 
-void reference_scatter(const uint32_t *list, size_t packs, size_t size, const float *some,
-                       float *all) {
+void ov_twin_scatter(const uint32_t *list, size_t packs, size_t size, const float *some,
+                     float *all) {
     for (size_t n = 0; n < packs; ++n)
         for (size_t k = 0; k < size; ++k)
             all[list[n] * size + k] = some[n * size + k];
 }
 
-double reference_rest(double bound, double value) {
+double ov_twin_rest(double bound, double value) {
     return fabs(bound) == (double)FLT_MAX ? bound : bound - value;
 }

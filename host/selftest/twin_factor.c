@@ -1,4 +1,4 @@
-#include "reference/factor.h"
+#include "selftest/twin_factor.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@ static void whole_factor(const double *parameters, double l[3][3]) {
         l[row_of[k]][column_of[k]] = parameters[OV_FACTOR_L + k];
 }
 
-double reference_factor_value(const double parameters[OV_FACTOR_PARAMETERS], const double y[3]) {
+double ov_twin_factor_value(const double parameters[OV_FACTOR_PARAMETERS], const double y[3]) {
     double l[3][3], q = 0.0;
     whole_factor(parameters, l);
     for (int j = 0; j < 3; ++j) {
@@ -35,8 +35,8 @@ static void product(double left[3][3], double right[3][3], double out[3][3]) {
         }
 }
 
-void reference_factor_map(const double parameters[OV_FACTOR_PARAMETERS],
-                          double map[OV_MONOMIALS][OV_FACTOR_PARAMETERS]) {
+void ov_twin_factor_map(const double parameters[OV_FACTOR_PARAMETERS],
+                        double map[OV_MONOMIALS][OV_FACTOR_PARAMETERS]) {
     double l[3][3], a[3][3];
     memset(map, 0, OV_MONOMIALS * sizeof *map);
     whole_factor(parameters, l);
@@ -57,15 +57,15 @@ void reference_factor_map(const double parameters[OV_FACTOR_PARAMETERS],
     }
 }
 
-void reference_jacobian(const double *parameters, size_t count, const double y[3], double *row) {
+void ov_twin_jacobian(const double *parameters, size_t count, const double y[3], double *row) {
     for (size_t i = 0; i < count; ++i) {
         const double *const own = parameters + i * OV_FACTOR_PARAMETERS;
         double map[OV_MONOMIALS][OV_FACTOR_PARAMETERS], z[3], m[OV_MONOMIALS];
         for (int k = 0; k < 3; ++k)
             z[k] = y[k] - own[OV_FACTOR_CENTRE + k];
-        reference_monomials(z, m);
-        reference_factor_map(own, map);
-        const double value = reference_factor_value(own, y);
+        ov_twin_monomials(z, m);
+        ov_twin_factor_map(own, map);
+        const double value = ov_twin_factor_value(own, y);
         for (int j = 0; j < OV_FACTOR_PARAMETERS; ++j) {
             double polynomial = 0.0;
             for (int n = 0; n < OV_MONOMIALS; ++n)
@@ -75,17 +75,16 @@ void reference_jacobian(const double *parameters, size_t count, const double y[3
     }
 }
 
-void reference_system(const double *parameters, size_t count, const double *xyz,
-                      const float *weight, const float *u, size_t points, double lambda,
-                      double *matrix, double *right) {
+bool ov_twin_system(const double *parameters, size_t count, const double *xyz, const float *weight,
+                    const float *u, size_t points, double lambda, double *matrix, double *right) {
     const size_t size = count * OV_FACTOR_PARAMETERS;
     double *const row = calloc(size > 0 ? size : 1, sizeof *row);
     if (!row)
-        abort();
+        return false;
     memset(matrix, 0, size * size * sizeof *matrix);
     memset(right, 0, size * sizeof *right);
     for (size_t k = 0; k < points; ++k) {
-        reference_jacobian(parameters, count, xyz + 3 * k, row);
+        ov_twin_jacobian(parameters, count, xyz + 3 * k, row);
         for (size_t i = 0; i < size; ++i) {
             right[i] -= row[i] * u[k];
             for (size_t j = 0; j <= i; ++j)
@@ -99,9 +98,10 @@ void reference_system(const double *parameters, size_t count, const double *xyz,
             matrix[j * size + i] = matrix[i * size + j];
     }
     free(row);
+    return true;
 }
 
-bool reference_solve(double *matrix, size_t size, double *x) {
+bool ov_twin_solve(double *matrix, size_t size, double *x) {
     for (size_t i = 0; i < size; ++i) {
         double *const row = matrix + i * size;
         for (size_t j = 0; j <= i; ++j) {

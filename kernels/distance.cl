@@ -61,18 +61,19 @@ static inline void ov_put_triangle(const float *p, const float *u, const float *
     to[17 * OV_LEAF] = ov_inverse(ov_square(across));
 }
 
-/* The leaves of `triangles` triangles, three corners each, and the box about each leaf: low x, y,
- * z, high x, y, z. xyz: of the vertices. */
-__kernel void pack_leaves(const uint leaves, const uint triangles,
-                          __global const uint *restrict corners, __global const float *restrict xyz,
-                          __global float *restrict packed, __global float *restrict boxes) {
+/* The leaves of `triangles` triangles, three corners each, from number `first` on, each `stride`-th
+ * of them, and the box about each leaf: low x, y, z, high x, y, z. xyz: of the vertices. */
+__kernel void pack_leaves(const uint leaves, const uint triangles, const uint first,
+                          const uint stride, __global const uint *restrict corners,
+                          __global const float *restrict xyz, __global float *restrict packed,
+                          __global float *restrict boxes) {
     const uint leaf = get_global_id(0);
     if (leaf >= leaves)
         return;
     float low[3] = {FLT_MAX, FLT_MAX, FLT_MAX}, high[3] = {-FLT_MAX, -FLT_MAX, -FLT_MAX};
     for (uint j = 0; j < OV_LEAF; ++j) {
         __global const uint *const corner =
-            corners + 3 * (size_t)min(leaf * OV_LEAF + j, triangles - 1);
+            corners + 3 * (first + stride * (size_t)min(leaf * OV_LEAF + j, triangles - 1));
         float p[3], u[3], v[3];
         for (uint k = 0; k < 3; ++k) {
             const float a = xyz[3 * (size_t)corner[0] + k], b = xyz[3 * (size_t)corner[1] + k],
@@ -254,18 +255,19 @@ static inline float ov_nearest(float px, float py, float pz, float bound, float 
 /* Leaves before and after that one whose corners are tried. */
 #define NEAR_LEAVES 3u
 
-/* squared[k] = squared distance of point k, xyz[3 * k + {0, 1, 2}], to the leaves from first_leaf
- * to end_leaf, which lie between low and high and whose triangles are given; with use_bound to them
- * or what squared[k] was before, whichever is less. For `each` consecutive points per work-item:
+/* Point k is xyz[3 * (from + k) + {0, 1, 2}], and squared[k], counted from number `to` on, becomes
+ * its squared distance to the leaves from first_leaf to end_leaf, which lie between low and high
+ * and whose triangles are given; with use_bound to them or what squared[k] was before, whichever is
+ * less. For `each` consecutive points per work-item:
  * corners about the leaf that was nearest to one of them bound the distance of the next, most often
  * by `enough` already. Infinite beyond what a float holds. What is at most `enough` need not be the
  * least, only as much as the distance or more. */
-__kernel void distances(const uint count, const uint each, __global const float *restrict xyz,
-                        const ov_tree tree, __global const float *restrict boxes,
-                        const uint first_leaf, const uint end_leaf, const float4 low,
-                        const float4 high, __global const float *restrict triangles,
-                        const uint use_bound, const float enough,
-                        __global float *restrict squared) {
+__kernel void distances(const uint count, const uint each, const uint from,
+                        __global const float *restrict xyz, const ov_tree tree,
+                        __global const float *restrict boxes, const uint first_leaf,
+                        const uint end_leaf, const float4 low, const float4 high,
+                        __global const float *restrict triangles, const uint use_bound,
+                        const float enough, const uint to, __global float *restrict squared) {
     /* A copy, made where all work-items still run together: see lists.cl. */
     const int levels = (int)tree.levels;
     uint first_group[OV_LEVELS];
@@ -274,8 +276,9 @@ __kernel void distances(const uint count, const uint each, __global const float 
     const size_t first = get_global_id(0) * (size_t)each;
     uint leaf = end_leaf; /* none */
     for (size_t k = first; k < min(first + each, (size_t)count); ++k) {
-        const float x = xyz[3 * k], y = xyz[3 * k + 1], z = xyz[3 * k + 2];
-        float bound = use_bound ? squared[k] : INFINITY;
+        __global const float *const point = xyz + 3 * (from + k);
+        const float x = point[0], y = point[1], z = point[2];
+        float bound = use_bound ? squared[to + k] : INFINITY;
         const float bx = max(max(low.x - x, x - high.x), 0.0f),
                     by = max(max(low.y - y, y - high.y), 0.0f),
                     bz = max(max(low.z - z, z - high.z), 0.0f);
@@ -292,6 +295,6 @@ __kernel void distances(const uint count, const uint each, __global const float 
         if (bound > enough)
             bound = ov_nearest(x, y, z, bound, enough, levels, first_group, boxes, first_leaf,
                                end_leaf, triangles, &leaf);
-        squared[k] = bound;
+        squared[to + k] = bound;
     }
 }

@@ -2,6 +2,7 @@
  * Sums over the terms that reach a pack, at each of its points (design: operation "field").
  *
  * points: OV_PACK x, then OV_PACK y, then OV_PACK z for each pack, angstrom from the pack's origin.
+ * field() alone also takes packs that are all alike: points then has one pack, for all of them.
  * origins: of each pack, x, y, z, relative to what terms are relative to; w is not used here.
  * start, item: the terms of pack p are item[start[p]] .. item[start[p + 1] - 1].
  * One pack per OV_LANES work-items; every lane runs over the whole list for its own points.
@@ -23,7 +24,7 @@ static inline void ov_load_points(ov_lane_points *lane_points, __global const fl
 }
 
 /* value[k] = sum_i e_i(y_k) */
-__kernel void field(const uint packs, __global const float *restrict points,
+__kernel void field(const uint packs, const uint alike, __global const float *restrict points,
                     __global const float4 *restrict origins, __global const uint *restrict start,
                     __global const uint *restrict item, __global const ov_term *restrict terms,
                     __global float *restrict value) {
@@ -31,7 +32,7 @@ __kernel void field(const uint packs, __global const float *restrict points,
     if (pack >= packs)
         return;
     ov_lane_points p;
-    ov_load_points(&p, points, pack, lane);
+    ov_load_points(&p, points, alike ? 0 : pack, lane);
     const float4 origin = origins[pack];
     ov_vec sum[OV_VECTORS];
 #pragma unroll
@@ -59,15 +60,16 @@ __kernel void field(const uint packs, __global const float *restrict points,
 
 /* value[k] = weight[k] sum_i e_i(y_k) p_i(y_k - mu_i); weight: OV_PACK per pack, or null for 1;
  * polynomial: OV_MONOMIALS coefficients per term, in the order of shared.h. With p_i the
- * derivatives along a direction v of the parameters this is J v, and W J v with weights. */
+ * derivatives along a direction v of the parameters this is J v, and W J v with weights. idle:
+ * null, or a word that is not 0 where there is nothing to be done. */
 __kernel void
-field_polynomial(const uint packs, __global const float *restrict points,
-                 __global const float4 *restrict origins, __global const uint *restrict start,
-                 __global const uint *restrict item, __global const ov_term *restrict terms,
-                 __global const float *restrict polynomial, __global const float *restrict weight,
-                 __global float *restrict value) {
+field_polynomial(const uint packs, __global const uint *restrict idle,
+                 __global const float *restrict points, __global const float4 *restrict origins,
+                 __global const uint *restrict start, __global const uint *restrict item,
+                 __global const ov_term *restrict terms, __global const float *restrict polynomial,
+                 __global const float *restrict weight, __global float *restrict value) {
     const uint pack = get_global_id(0) / OV_LANES, lane = get_global_id(0) % OV_LANES;
-    if (pack >= packs)
+    if (pack >= packs || (idle && *idle != 0))
         return;
     ov_lane_points p;
     ov_load_points(&p, points, pack, lane);

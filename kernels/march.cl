@@ -64,6 +64,15 @@ static inline corners load_corners(__global const uint *sign, uint brick, uint n
     return c;
 }
 
+/* Whether all points of a brick and its neighbours are on one side, as nearly everywhere. */
+static inline bool is_uniform(__global const uint *sign, uint brick, uint nx, uint ny) {
+    const uint row = nx + 1, layer = row * (ny + 1);
+    __global const uint *const s = sign + brick, *const t = s + layer;
+    const uint any = s[0] | s[1] | s[row] | s[row + 1] | t[0] | t[1] | t[row] | t[row + 1];
+    const uint all = s[0] & s[1] & s[row] & s[row + 1] & t[0] & t[1] & t[row] & t[row + 1];
+    return any == 0 || all == ALL;
+}
+
 /* Cells with corners on both sides. */
 static inline uint mixed_cells(const corners *c) {
     uint any = 0, all = ALL;
@@ -87,38 +96,85 @@ static inline uint lowest_bit(uint mask) {
 
 /* sign: bit j set where point j of a brick is inside, phi > c: a point where phi only touches c,
  * such as the centre of an atom of radius 0, has no surface about it. All bricks of the padded
- * grid. */
+ * grid, by place: brick_of. */
 __kernel void march_signs(const uint bricks, const uint run, const float isovalue,
-                          __global const uint *restrict place, __global const float *restrict value,
-                          __global uint *restrict sign) {
+                          __global const uint *restrict brick_of,
+                          __global const float *restrict value, __global uint *restrict sign) {
     const uint first = get_global_id(0) * run, end = min(first + run, bricks);
-    for (uint brick = first; brick < end; ++brick) {
-        __global const float *const v = value + (size_t)place[brick] * OV_PACK;
-        uint mask = 0;
-        for (uint j = 0; j < OV_PACK; ++j)
-            mask |= (v[j] > isovalue ? 1u : 0u) << j;
-        sign[brick] = mask;
+    const int16 bit = (int16)(1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7,
+                              1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15);
+    for (uint k = first; k < end; ++k) {
+        const int16 lane = (vload16(k, value) > isovalue) & bit;
+        const int8 eight = lane.lo | lane.hi;
+        const int4 four = eight.lo | eight.hi;
+        const int2 two = four.lo | four.hi;
+        sign[brick_of[k]] = (uint)(two.x | two.y);
     }
 }
 
 /* For the nx * ny * nz bricks of the piece, in raster order: masks of crossed edges into `crossing`
- * (of the padded grid), number of vertices + 256 * number of triangles into `found` (of the piece).
- */
+ * (of the padded grid), number of vertices + 256 * number of triangles into `found` (of the piece,
+ * by place). */
 __kernel void march_count(const uint nx, const uint ny, const uint nz, const uint run,
-                          __global const uint *restrict sign, __global const uchar *restrict cases,
-                          __global uint4 *restrict crossing, __global uint *restrict found) {
+                          __global const uint *restrict place, __global const uint *restrict sign,
+                          __global const uchar *restrict cases, __global uint4 *restrict crossing,
+                          __global uint *restrict found) {
     const uint bricks = nx * ny * nz;
     const uint first = get_global_id(0) * run, end = min(first + run, bricks);
     for (uint k = first; k < end; ++k) {
         const uint brick = (k / (nx * ny) * (ny + 1) + k / nx % ny) * (nx + 1) + k % nx;
+        if (is_uniform(sign, brick, nx, ny)) {
+            crossing[brick] = (uint4)(0, 0, 0, 0);
+            found[place[brick]] = 0;
+            continue;
+        }
         const corners c = load_corners(sign, brick, nx, ny);
         uint count = 0;
         for (uint cells = mixed_cells(&c); cells; cells &= cells - 1)
             count += cases[case_of(&c, lowest_bit(cells)) * OV_CASE_BYTES];
         const uint x = c.at[0] ^ c.at[1], y = c.at[0] ^ c.at[2], z = c.at[0] ^ c.at[4];
         crossing[brick] = (uint4)(0, x, y, z);
-        found[k] = popcount(x) + popcount(y) + popcount(z) + (count << 8);
+        found[place[brick]] = popcount(x) + popcount(y) + popcount(z) + (count << 8);
     }
+}
+
+/* Bricks with something in them, vertices and triangles among those from first to end. */
+static inline uint3 count_found(__global const uint *restrict found, uint first, uint end) {
+    uint3 sum = 0;
+    for (uint k = first; k < end; ++k) {
+        const uint own = found[k];
+        sum += (uint3)(own > 0 ? 1 : 0, own & 255u, own >> 8);
+    }
+    return sum;
+}
+
+/* Numbers the vertices and triangles of `bricks` bricks by place, which follows a space-filling
+ * curve, and lists the bricks that have some as march_vertices() wants it; before: vertices of the
+ * mesh so far. brick_of: number in the padded grid of the brick at a place. totals: entries of the
+ * list, vertices, triangles. One work-group of OV_SCAN_GROUP work-items at most. */
+__kernel void march_number(const uint bricks, const uint before,
+                           __global const uint *restrict brick_of,
+                           __global const uint *restrict found, __global uint4 *restrict list,
+                           __global uint *restrict totals) {
+    __local uint scratch[3 * OV_SCAN_GROUP];
+    const uint at = get_local_id(0), size = get_local_size(0), each = (bricks + size - 1) / size;
+    const uint first = min(at * each, bricks), end = min(first + each, bricks);
+    if (get_group_id(0) > 0)
+        return;
+    vstore3(count_found(found, first, end), at, scratch);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    uint3 so_far = 0;
+    for (uint k = 0; k < at; ++k)
+        so_far += vload3(k, scratch);
+    for (uint k = first; k < end; ++k) {
+        const uint own = found[k];
+        if (own == 0)
+            continue;
+        list[so_far.x] = (uint4)(brick_of[k], so_far.y, so_far.z, before + so_far.y);
+        so_far += (uint3)(1, own & 255u, own >> 8);
+    }
+    if (at == size - 1)
+        vstore3(so_far, 0, totals);
 }
 
 /* values[k], crossings[k] = those of the k-th brick of the list. */
@@ -178,9 +234,9 @@ static inline float keep_within(float t) {
  * search, as ln phi is quadratic about a single atom. */
 static inline float crossing_at(float a, float b, float isovalue, int logarithmic) {
     if (logarithmic) {
-        a = log(max(a, 1e-37f));
-        b = log(max(b, 1e-37f));
-        isovalue = log(isovalue);
+        a = log(max(a, 1e-37f) / isovalue);
+        b = log(max(b, 1e-37f) / isovalue);
+        isovalue = 0.0f;
     }
     const float t = (isovalue - a) / (b - a);
     return t >= 0.0f && t <= 1.0f ? t : 0.5f; /* not a number where phi overflows */
@@ -188,8 +244,8 @@ static inline float crossing_at(float a, float b, float isovalue, int logarithmi
 
 /* The vertices of the listed bricks, and their numbers into `crossing`. Each entry of the list is
  * {brick, first vertex within the piece, first triangle, number of the first vertex}. edge: x + (y
- * << 7) + (z << 14) of the low end in lattice points from the piece's corner, axis << 20, and 1 <<
- * 22 if the low end is inside. t: where on the edge. */
+ * << 8) + (z << 16) of the low end in lattice points from the piece's corner, axis << 24, and 1 <<
+ * 26 if the low end is inside. t: where on the edge. */
 __kernel void march_vertices(const uint count, __global const uint4 *restrict list, const uint nx,
                              const uint ny, const float isovalue, const int logarithmic,
                              __global const uint *restrict place,
@@ -214,23 +270,24 @@ __kernel void march_vertices(const uint count, __global const uint4 *restrict li
             const float b = value[(size_t)place[end.brick] * OV_PACK + end.point];
             const uint x = bx * OV_BRICK_X + (point & 3u), y = by * OV_BRICK_Y + (point >> 2 & 1u),
                        z = bz * OV_BRICK_Z + (point >> 3);
-            edge[at] = x | y << 7 | z << 14 | axis << 20 | (a > isovalue ? 1u : 0u) << 22;
+            edge[at] = x | y << 8 | z << 16 | axis << 24 | (a > isovalue ? 1u : 0u) << 26;
             t[at] = keep_within(crossing_at(a, b, isovalue, logarithmic));
         }
 }
 
 /* Fills the last pack of vertices up with its last one. box: of each pack, low x, y, z, high x, y,
- * z in lattice points from the piece's corner, wherever on their edges the vertices come to lie. */
-__kernel void march_boxes(const uint packs, const uint vertices, __global uint *restrict edge,
-                          __global float *restrict t, __global int *restrict box) {
+ * z in angstrom from the piece's corner, wherever on their edges the vertices come to lie. */
+__kernel void march_boxes(const uint packs, const uint vertices, const float spacing,
+                          __global uint *restrict edge, __global float *restrict t,
+                          __global float *restrict box) {
     const uint pack = get_global_id(0);
     if (pack >= packs)
         return;
     const uint first = pack * OV_PACK;
-    int low[3] = {128, 128, 128}, high[3] = {0, 0, 0};
+    int low[3] = {256, 256, 256}, high[3] = {0, 0, 0};
     for (uint k = first; k < first + OV_PACK; ++k) {
-        const uint from = min(k, vertices - 1), code = edge[from], axis = code >> 20 & 3u;
-        const int at[3] = {code & 127u, code >> 7 & 127u, code >> 14 & 63u};
+        const uint from = min(k, vertices - 1), code = edge[from], axis = code >> 24 & 3u;
+        const int at[3] = {code & 255u, code >> 8 & 255u, code >> 16 & 255u};
         for (uint i = 0; i < 3; ++i) {
             low[i] = min(low[i], at[i]);
             high[i] = max(high[i], at[i] + (i == axis ? 1 : 0));
@@ -241,14 +298,16 @@ __kernel void march_boxes(const uint packs, const uint vertices, __global uint *
         }
     }
     for (uint i = 0; i < 3; ++i) {
-        box[6 * pack + i] = low[i];
-        box[6 * pack + 3 + i] = high[i];
+        box[6 * pack + i] = (float)low[i] * spacing;
+        box[6 * pack + 3 + i] = (float)high[i] * spacing;
     }
 }
 
-/* The triangles of the listed bricks, three vertex numbers each. */
-__kernel void march_triangles(const uint count, __global const uint4 *restrict list, const uint nx,
-                              const uint ny, __global const uint *restrict sign,
+/* The triangles of the listed bricks, three vertex numbers each, behind those that are there
+ * `before`. */
+__kernel void march_triangles(const uint count, const uint before,
+                              __global const uint4 *restrict list, const uint nx, const uint ny,
+                              __global const uint *restrict sign,
                               __global const uchar *restrict cases,
                               __global const uint4 *restrict crossing,
                               __global uint *restrict corner) {
@@ -257,7 +316,7 @@ __kernel void march_triangles(const uint count, __global const uint4 *restrict l
         return;
     const uint brick = list[item].x;
     const corners c = load_corners(sign, brick, nx, ny);
-    size_t at = (size_t)list[item].z * 3;
+    size_t at = ((size_t)before + list[item].z) * 3;
     for (uint cells = mixed_cells(&c); cells; cells &= cells - 1) {
         const uint point = lowest_bit(cells);
         __global const uchar *const entry = cases + case_of(&c, point) * OV_CASE_BYTES;
@@ -314,9 +373,9 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
     for (uint v = 0; v < OV_VECTORS; ++v) {
         const uint place = v * OV_LANES + lane;
         const ov_ivec code = OV_LOAD(place, codes);
-        const ov_vec x0 = TO_FLOAT(code & 127) * h, y0 = TO_FLOAT(code >> 7 & 127) * h,
-                     z0 = TO_FLOAT(code >> 14 & 63) * h;
-        const ov_ivec axis = code >> 20 & 3, low_inside = (code >> 22 & 1) == 1;
+        const ov_vec x0 = TO_FLOAT(code & 255) * h, y0 = TO_FLOAT(code >> 8 & 255) * h,
+                     z0 = TO_FLOAT(code >> 16 & 255) * h;
+        const ov_ivec axis = code >> 24 & 3, low_inside = (code >> 26 & 1) == 1;
         const ov_vec ux = axis == 0 ? one : zero, uy = axis == 1 ? one : zero,
                      uz = axis == 2 ? one : zero;
         ov_vec s = OV_LOAD(place, ts), from = zero, to = one, sum, gx, gy, gz;
@@ -367,5 +426,30 @@ __kernel void march_refine(const uint packs, const float spacing, const float is
         OV_STORE(usable ? gx * length : zero, place, out);
         OV_STORE(usable ? gy * length : zero, place, out + OV_PACK);
         OV_STORE(usable ? gz * length : zero, place, out + 2 * OV_PACK);
+    }
+}
+
+/* Coordinates of the piece's refined vertices behind those that are there `before`, and, unless
+ * normal is null, their normals. corner: of the piece, angstrom, as a float and what that leaves.
+ */
+__kernel void march_place(const uint count, const uint before, const float spacing,
+                          const float4 corner, const float4 rest,
+                          __global const uint *restrict edge, __global const float *restrict t,
+                          __global const float *restrict normal, __global float *restrict xyz,
+                          __global float *restrict normals) {
+    const uint pack = get_global_id(0);
+    for (uint k = pack * OV_PACK; k < min((pack + 1) * OV_PACK, count); ++k) {
+        const uint code = edge[k], axis = code >> 24 & 3u;
+        const size_t to = (size_t)before + k;
+        const float3 low =
+            convert_float3((uint3)(code & 255u, code >> 8 & 255u, code >> 16 & 255u));
+        const float along = t[k] * spacing;
+        const float3 small = rest.xyz + (float3)(axis == 0 ? along : 0.0f, axis == 1 ? along : 0.0f,
+                                                 axis == 2 ? along : 0.0f);
+        vstore3(corner.xyz + fma(low, (float3)(spacing), small), to, xyz);
+        if (normal)
+            for (uint i = 0; i < 3; ++i)
+                normals[3 * to + i] =
+                    normal[(size_t)pack * (3 * OV_PACK) + i * OV_PACK + k % OV_PACK];
     }
 }

@@ -5,6 +5,7 @@
  * start, item: the packs of term i are item[start[i]] .. item[start[i + 1] - 1].
  * points, origins: as for field().
  * u: weights of the points, OV_PACK per pack, 0 for points that only fill up the last pack.
+ * idle: null, or a word that is not 0 where there is nothing to be done.
  * moments: OV_MONOMIALS pairs (high, low) per term; the sum is high + low. Floats are summed over a
  * few thousand points and then added to a two-float total, so no device needs double precision.
  *
@@ -93,14 +94,15 @@ static inline void ov_add_team(float *high, float *low, uint lane, __local float
 }
 #endif
 
-OV_TEAM_KERNEL void moments(const uint count, __global const float *restrict points,
-                            __global const float4 *restrict origins,
-                            __global const float *restrict u, __global const uint *restrict start,
-                            __global const uint *restrict item,
-                            __global const ov_term *restrict terms,
-                            __global float *restrict result) {
+OV_TEAM_KERNEL void
+moments(const uint count, __global const uint *restrict idle, __global const float *restrict points,
+        __global const float4 *restrict origins, __global const float *restrict u,
+        __global const uint *restrict start, __global const uint *restrict item,
+        __global const ov_term *restrict terms, __global float *restrict result) {
     const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
     const uint lane = sharer % OV_LANES;
+    if (idle && *idle != 0)
+        return;
 #if OV_SHARERS == 1
     if (index >= count)
         return;

@@ -11,6 +11,10 @@
  * One work-item per ellipsoid in groups of OV_SOLVE_GROUP, which the build sets. Dot products: each
  * group leaves one partial sum, the next kernel's groups add them up, all in one order. Where
  * ellipsoids are few, one group does all of an iteration but the product with J^T W J.
+ *
+ * The device itself stops the iteration: state has a word that is not 0 once there is nothing more
+ * to be done, which makes the kernels of all iterations that follow return at once, and counts the
+ * iterations. What the residual has to fall to is `limit`, `share` of its start.
  */
 
 #define PARAMETERS 10
@@ -154,16 +158,20 @@ static inline float take_sum(__global const float *partial, uint groups) {
 
 /* The blocks C^T G C + lambda diag(C^T G C), factored; the diagonal D, 1 where a parameter does not
  * matter, so that it stays still even without damping; and the start of the iteration: x = 0, r =
- * -C^T moments, z = block^-1 r, p = z. */
-SOLVE_KERNEL void
-solve_start(const uint count, const float lambda, __global const float *restrict factor,
-            __global const float *restrict gram, __global const float *restrict moments,
-            __global float *restrict block, __global float *restrict diagonal,
-            __global float *restrict x, __global float *restrict r, __global float *restrict p,
-            __global float *restrict polynomial, __global float *restrict rz) {
+ * -C^T moments, z = block^-1 r, p = z, state = 0. */
+SOLVE_KERNEL void solve_start(const uint count, const float lambda,
+                              __global const float *restrict factor,
+                              __global const float *restrict gram,
+                              __global const float *restrict moments,
+                              __global float *restrict block, __global float *restrict diagonal,
+                              __global float *restrict x, __global float *restrict r,
+                              __global float *restrict p, __global float *restrict polynomial,
+                              __global float *restrict rz, __global uint *restrict state) {
     __local float scratch[OV_SOLVE_GROUP];
     const uint index = get_global_id(0);
     float sum = 0.0f;
+    if (index < 2)
+        state[index] = 0;
     if (index < count) {
         float l[FACTOR], c[OV_MONOMIALS], m[OV_MONOMIALS], v[PARAMETERS], a[BLOCK], d[PARAMETERS];
         load_factor(factor, index, l);
@@ -265,25 +273,42 @@ static inline void turn_one(uint index, float beta, __global const float *restri
     store_ten(c, index, polynomial);
 }
 
+/* How far to go along p. */
+static inline float step_length(float before, float curvature) {
+    return curvature > 0.0f && before > 0.0f ? before / curvature : 0.0f;
+}
+
+/* The state after an iteration that took the residual from `before` to `after`. One that was not to
+ * be done, or that begins with no residual at all, does not count. */
+static inline void next_state(__global const uint *restrict state, float before, float after,
+                              float share, __global float *restrict limit,
+                              __global uint *restrict state_next) {
+    if (state[1] == 0)
+        limit[0] = share * before;
+    state_next[0] = state[0] != 0 || !(before > 0.0f) || !(after > limit[0]);
+    state_next[1] = state[1] + (state[0] == 0 && before > 0.0f ? 1 : 0);
+}
+
 /* ---- many ellipsoids ------------------------------------------------------------------------ */
 
 /* q = C^T moments + lambda D p, and the partial sums of p . q. */
-SOLVE_KERNEL void solve_product(const uint count, const float lambda,
-                                __global const float *restrict factor,
-                                __global const float *restrict moments,
-                                __global const float *restrict diagonal,
-                                __global const float *restrict p, __global float *restrict q,
-                                __global float *restrict pq) {
+SOLVE_KERNEL void
+solve_product(const uint count, const float lambda, __global const uint *restrict state,
+              __global const float *restrict factor, __global const float *restrict moments,
+              __global const float *restrict diagonal, __global const float *restrict p,
+              __global float *restrict q, __global float *restrict pq) {
     __local float scratch[OV_SOLVE_GROUP];
     const uint index = get_global_id(0);
+    if (state[0] != 0)
+        return;
     const float sum =
         index < count ? multiply_one(index, lambda, factor, moments, diagonal, p, q) : 0.0f;
     leave_sum(sum, scratch, pq);
 }
 
-/* alpha = rz / pq; x += alpha p, r -= alpha q, z = block^-1 r, and the partial sums of r . z. Where
- * rz is not above `least` the iteration was not to be done any more: x and r stay. */
-SOLVE_KERNEL void solve_update(const uint count, const uint groups, const float least,
+/* alpha = rz / pq; x += alpha p, r -= alpha q, z = block^-1 r, and the partial sums of r . z. */
+SOLVE_KERNEL void solve_update(const uint count, const uint groups,
+                               __global const uint *restrict state,
                                __global const float *restrict block,
                                __global const float *restrict rz, __global const float *restrict pq,
                                __global const float *restrict p, __global const float *restrict q,
@@ -292,30 +317,33 @@ SOLVE_KERNEL void solve_update(const uint count, const uint groups, const float 
     __local float scratch[OV_SOLVE_GROUP];
     __local float alpha;
     const uint index = get_global_id(0);
-    if (get_local_id(0) == 0) {
-        const float curvature = take_sum(pq, groups), before = take_sum(rz, groups);
-        alpha = curvature > 0.0f && before > least ? before / curvature : 0.0f;
-    }
+    if (state[0] != 0)
+        return;
+    if (get_local_id(0) == 0)
+        alpha = step_length(take_sum(rz, groups), take_sum(pq, groups));
     barrier(CLK_LOCAL_MEM_FENCE);
     const float sum = index < count ? advance_one(index, alpha, block, p, q, x, r, z) : 0.0f;
     leave_sum(sum, scratch, rz_next);
 }
 
-/* beta = rz_next / rz; p = z + beta p and its polynomials. */
-SOLVE_KERNEL void solve_direction(const uint count, const uint groups,
-                                  __global const float *restrict factor,
-                                  __global const float *restrict rz,
-                                  __global const float *restrict rz_next,
-                                  __global const float *restrict z, __global float *restrict p,
-                                  __global float *restrict polynomial) {
+/* beta = rz_next / rz; p = z + beta p and its polynomials; and the state after the iteration. */
+SOLVE_KERNEL void
+solve_direction(const uint count, const uint groups, const float share,
+                __global const uint *restrict state, __global const float *restrict factor,
+                __global const float *restrict rz, __global const float *restrict rz_next,
+                __global const float *restrict z, __global float *restrict p,
+                __global float *restrict polynomial, __global float *restrict limit,
+                __global uint *restrict state_next) {
     __local float beta;
     const uint index = get_global_id(0);
     if (get_local_id(0) == 0) {
-        const float before = take_sum(rz, groups);
-        beta = before > 0.0f ? take_sum(rz_next, groups) / before : 0.0f;
+        const float before = take_sum(rz, groups), after = take_sum(rz_next, groups);
+        beta = before > 0.0f ? after / before : 0.0f;
+        if (index == 0)
+            next_state(state, before, after, share, limit, state_next);
     }
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (index < count)
+    if (index < count && state[0] == 0)
         turn_one(index, beta, factor, z, p, polynomial);
 }
 
@@ -349,25 +377,31 @@ static inline float sum_of_group(float own, __local float *scratch) {
 /* The three above in one, by one work-group: for up to OV_SOLVE_ALONE ellipsoids, for which a
  * launch takes longer than what it does. Each work-item has its own ellipsoids from beginning to
  * end. rz: the partial sums of `groups` groups; rz_next: one sum. */
-__kernel void solve_step(const uint count, const float lambda, const uint groups, const float least,
-                         __global const float *restrict factor,
+__kernel void solve_step(const uint count, const float lambda, const uint groups, const float share,
+                         __global const uint *restrict state, __global const float *restrict factor,
                          __global const float *restrict moments,
                          __global const float *restrict diagonal,
                          __global const float *restrict block, __global const float *restrict rz,
                          __global float *restrict p, __global float *restrict q,
                          __global float *restrict x, __global float *restrict r,
                          __global float *restrict z, __global float *restrict polynomial,
-                         __global float *restrict rz_next) {
+                         __global float *restrict rz_next, __global float *restrict limit,
+                         __global uint *restrict state_next) {
     __local float scratch[OV_SOLVE_WIDE];
     const uint at = get_local_id(0), size = get_local_size(0);
     const float before = take_sum(rz, groups);
     float sum = 0.0f;
     if (get_group_id(0) > 0)
         return;
+    if (state[0] != 0) {
+        if (at == 0)
+            next_state(state, before, before, share, limit, state_next);
+        return;
+    }
     for (uint index = at; index < count; index += size)
         sum += multiply_one(index, lambda, factor, moments, diagonal, p, q);
     const float curvature = sum_of_group(sum, scratch);
-    const float alpha = curvature > 0.0f && before > least ? before / curvature : 0.0f;
+    const float alpha = step_length(before, curvature);
     sum = 0.0f;
     for (uint index = at; index < count; index += size)
         sum += advance_one(index, alpha, block, p, q, x, r, z);
@@ -375,6 +409,8 @@ __kernel void solve_step(const uint count, const float lambda, const uint groups
     const float beta = before > 0.0f ? after / before : 0.0f;
     for (uint index = at; index < count; index += size)
         turn_one(index, beta, factor, z, p, polynomial);
-    if (at == 0)
+    if (at == 0) {
         rz_next[0] = after;
+        next_state(state, before, after, share, limit, state_next);
+    }
 }

@@ -11,7 +11,7 @@
 #include "mesh/mesh.h"
 #include "model/ellipsoid.h"
 #include "model/model.h"
-#include "reference/march.h"
+#include "selftest/twin_march.h"
 
 #define PI 3.14159265358979323846
 #define APBS_FAS2 "/usr/share/apbs/examples/misc/fas2.pqr"
@@ -237,10 +237,10 @@ static int64_t expect_surface(const ovoid_mesh *mesh, const ov_quadric *quadrics
     for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
         const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
         const float *const n = ovoid_mesh_normals(mesh) + 3 * v;
-        reference_sum gradient[3];
+        ov_twin_sum gradient[3];
         int64_t low[3];
-        const reference_sum phi = reference_field(quadrics, count, y);
-        reference_gradient(quadrics, count, y, gradient);
+        const ov_twin_sum phi = ov_twin_field(quadrics, count, y);
+        ov_twin_gradient(quadrics, count, y, gradient);
         const unsigned axis = edge_of(mesh, v, options->spacing, low);
         const double length =
             sqrt(gradient[0].value * gradient[0].value + gradient[1].value * gradient[1].value +
@@ -521,7 +521,7 @@ static void sort_triangles(uint32_t *corner, size_t triangles) {
     qsort(corner, triangles, 3 * sizeof *corner, compare_triangles);
 }
 
-static void expect_same(const ovoid_mesh *mesh, reference_mesh *wanted, double accuracy) {
+static void expect_same(const ovoid_mesh *mesh, ov_twin_mesh *wanted, double accuracy) {
     const size_t triangles = ovoid_mesh_triangles(mesh), vertices = ovoid_mesh_vertices(mesh);
     assert_int_equal(vertices, wanted->vertices);
     assert_int_equal(triangles, wanted->triangles);
@@ -538,7 +538,7 @@ static void expect_same(const ovoid_mesh *mesh, reference_mesh *wanted, double a
             point = point * wanted->size[k] + (size_t)(low[k] - wanted->low[k]);
         }
         name[v] = wanted->vertex[3 * point + axis];
-        assert_true(name[v] != REFERENCE_NO_VERTEX);
+        assert_true(name[v] != OV_TWIN_NO_VERTEX);
         assert_false(taken[name[v]]);
         taken[name[v]] = true;
         expect_near(ovoid_mesh_xyz(mesh)[3 * v + axis], wanted->xyz[3 * (size_t)name[v] + axis],
@@ -564,9 +564,9 @@ static void pieces_give_the_plain_mesh(void **state) {
     ov_quadric *quadrics;
     ov_body *const bodies = noise(&random, count, half, &quadrics);
     const ovoid_mesh_options options = options_of(1.0, spacing, OVOID_VERTEX_LINEAR);
-    reference_mesh wanted;
-    reference_march(quadrics, count, 1.0, spacing, (const int64_t[3]){low, low, low},
-                    (const size_t[3]){box, box, box}, &wanted);
+    ov_twin_mesh wanted;
+    assert_true(ov_twin_march(quadrics, count, 1.0, spacing, (const int64_t[3]){low, low, low},
+                              (const size_t[3]){box, box, box}, &wanted));
     for (size_t k = 0; k < sizeof limits / sizeof limits[0]; ++k) {
         ovoid_mesh *mesh = NULL;
         if (test_small() && k > 1)
@@ -578,7 +578,7 @@ static void pieces_give_the_plain_mesh(void **state) {
         expect_same(mesh, &wanted, 1e-5);
         ovoid_mesh_destroy(&mesh);
     }
-    reference_mesh_destroy(&wanted);
+    ov_twin_mesh_destroy(&wanted);
     free(bodies);
     free(quadrics);
 }
@@ -693,15 +693,15 @@ static void pieces_reach_as_far_as_the_surface(void **state) {
             xyzr[axis] = random_uniform(&random, -0.8, 0.8);
         xyzr[3] = random_uniform(&random, 0.7, 1.8);
         ov_body body;
-        reference_mesh wanted;
+        ov_twin_mesh wanted;
         ovoid_mesh *mesh = NULL;
         ov_body_of_atom(xyzr, 0.5, &body);
-        reference_march(&body.quadric, 1, 1.0, spacing, low, box, &wanted);
+        assert_true(ov_twin_march(&body.quadric, 1, 1.0, spacing, low, box, &wanted));
         test_check(*state, ov_march(*state, &body, 1, &options, limit, &mesh));
         assert_int_equal(expect_closed(mesh), 2);
         expect_same(mesh, &wanted, 1e-5);
         ovoid_mesh_destroy(&mesh);
-        reference_mesh_destroy(&wanted);
+        ov_twin_mesh_destroy(&wanted);
     }
 }
 
@@ -747,7 +747,7 @@ static void two_runs_are_the_same(void **state) {
     free(quadrics);
 }
 
-/* A light mesh is the other one rounded, about an origin of the caller's, one vertex without a
+/* A light mesh is the other one in floats, about an origin of the caller's, one vertex without a
  * gradient included; every vertex has a triangle. */
 static void light_meshes_are_the_same(void **state) {
     const double xyzr[8] = {-1.75, 0.0, 0.0, 1.5, 1.75, 0.0, 0.0, 1.5}, at[3] = {0};
@@ -776,12 +776,72 @@ static void light_meshes_are_the_same(void **state) {
         used[full->corners[k]] = true;
     for (size_t k = 0; k < 3 * vertices; ++k) {
         assert_true(used[k / 3]);
-        assert_true(light->offsets[k] == (float)(full->xyz[k] - origin[k % 3]));
+        expect_near(light->offsets[k], full->xyz[k] - origin[k % 3], 4e-6, "an offset");
         expect_near(light->normals[k], full->normals[k], 1e-5, "a normal");
     }
     free(used);
     ovoid_mesh_destroy(&full);
     ovoid_mesh_destroy(&light);
+}
+
+/* What the device has of a mesh is the mesh. */
+static void expect_on_device(ovoid_context *context, const ovoid_mesh *mesh) {
+    const size_t values = 3 * mesh->vertices, corners = 3 * mesh->triangles;
+    assert_non_null(mesh->on_device[OV_ON_DEVICE_OFFSETS].memory);
+    float *const offsets = read_floats(context, &mesh->on_device[OV_ON_DEVICE_OFFSETS], values);
+    float *const numbers = read_floats(context, &mesh->on_device[OV_ON_DEVICE_CORNERS], corners);
+    assert_memory_equal(offsets, mesh->offsets, values * sizeof *offsets);
+    assert_memory_equal(numbers, mesh->corners, corners * sizeof *mesh->corners);
+    free(offsets);
+    free(numbers);
+}
+
+/* One marcher, one mesh after the other, small, larger, with a speck, in several pieces: each is
+ * what a marcher of its own makes; and on the device, too, unless it has grown too much or its
+ * specks come from the host. */
+static void light_meshes_stay_on_the_device(void **state) {
+    const double origin[3] = {1.0, 2.0, -3.0};
+    const struct {
+        double xyzr[8];
+        size_t atoms;
+        bool there, alone; /* on the device, and after the first mesh of a marcher */
+    } cases[] = {{{0, 0, 0, 1.5}, 1, true, true},
+                 {{0, 0, 0, 1.55}, 1, true, true},
+                 {{0, 0, 0, 1.5, 3.0, 0.4, 0.1, 2.0}, 2, true, true},
+                 {{0.2, 0.2, 0.2, 1.5, 9.2, 0.2, 0.2, 0.2}, 2, false, false},
+                 {{-70.0, 0, 0, 1.5, 71.0, 0, 0, 1.6}, 2, true, false}};
+    const ovoid_mesh_options options = options_of(1.0, 0.5, OVOID_VERTEX_EXACT);
+    ov_marcher *marcher = NULL;
+    test_check(*state, ov_marcher_create(*state, &marcher));
+    for (size_t n = 0; n < test_size(sizeof cases / sizeof *cases, 2); ++n) {
+        ov_body bodies[2];
+        ovoid_mesh *mesh = NULL, *own = NULL;
+        ov_marcher *fresh = NULL;
+        for (size_t i = 0; i < cases[n].atoms; ++i)
+            ov_body_of_atom(cases[n].xyzr + 4 * i, 0.5, &bodies[i]);
+        test_check(*state, ov_mesh_bodies_light(*state, marcher, bodies, cases[n].atoms, &options,
+                                                origin, NULL, n % 2 == 0, &mesh));
+        test_check(*state, ov_marcher_create(*state, &fresh));
+        test_check(*state, ov_mesh_bodies_light(*state, fresh, bodies, cases[n].atoms, &options,
+                                                origin, NULL, true, &own));
+        print_message("%zu vertices, %zu triangles, %s\n", mesh->vertices, mesh->triangles,
+                      mesh->on_device[0].memory ? "on the device" : "not on the device");
+        assert_int_equal(mesh->vertices, own->vertices);
+        assert_int_equal(mesh->triangles, own->triangles);
+        assert_memory_equal(mesh->offsets, own->offsets, 3 * mesh->vertices * sizeof(float));
+        assert_memory_equal(mesh->corners, own->corners, 3 * mesh->triangles * sizeof(uint32_t));
+        assert_true((mesh->normals == NULL) == (n % 2 != 0));
+        if (mesh->normals)
+            assert_memory_equal(mesh->normals, own->normals, 3 * mesh->vertices * sizeof(float));
+        assert_true((mesh->on_device[0].memory != NULL) == cases[n].there);
+        assert_true((own->on_device[0].memory != NULL) == cases[n].alone);
+        if (cases[n].there)
+            expect_on_device(*state, mesh);
+        ovoid_mesh_destroy(&mesh);
+        ovoid_mesh_destroy(&own);
+        ov_marcher_destroy(&fresh);
+    }
+    ov_marcher_destroy(&marcher);
 }
 
 /* ---- specks ------------------------------------------------------------------------------- */
@@ -1080,6 +1140,7 @@ int main(void) {
         cmocka_unit_test(tips_at_the_ends_of_pieces),
         cmocka_unit_test(two_runs_are_the_same),
         cmocka_unit_test(light_meshes_are_the_same),
+        cmocka_unit_test(light_meshes_stay_on_the_device),
         cmocka_unit_test(small_spheres_have_their_area),
         cmocka_unit_test(specks_are_found_once),
         cmocka_unit_test(specks_beside_others),

@@ -118,6 +118,7 @@ static void test_light(void **state) {
     ovoid_mesh *full = shape_mesh(*state, &s), *light = NULL;
     test_check(*state, ov_mesh_adopt_light(*state, offsets, origin, normals, s.vertices, corners,
                                            s.triangles, &light));
+    test_check(*state, ov_mesh_finish(*state, light));
     assert_int_equal(light->components, 2);
     assert_memory_equal(light->component_of, full->component_of,
                         s.vertices * sizeof *light->component_of);

@@ -44,14 +44,55 @@ static double *in_double(const float *values, size_t count) {
 static void expect_moments(bench *b, const float *u, double *worst, const char *what) {
     double *const got = moments_of(b, u), *const weights = in_double(u, b->count);
     for (size_t i = 0; i < b->terms_count; ++i) {
-        reference_sum wanted[OV_MONOMIALS];
-        reference_moments(&b->quadrics[i], b->xyz, weights, b->count, wanted);
+        ov_twin_sum wanted[OV_MONOMIALS];
+        ov_twin_moments(&b->quadrics[i], b->xyz, weights, b->count, wanted);
         for (size_t m = 0; m < OV_MONOMIALS; ++m)
             expect_close(got[i * OV_MONOMIALS + m], wanted[m], TOLERANCE, worst, what,
                          i * OV_MONOMIALS + m);
     }
     free(got);
     free(weights);
+}
+
+/* A word on the device says whether there is anything to be done: what was there stays otherwise.
+ */
+static void idle_kernels_leave_results(void **state) {
+    bench b;
+    ov_buffer weights = {0}, moments = {0}, polynomial = {0}, value = {0}, word = {0};
+    test_random random = {12};
+    bench_random(&b, *state, MODEL_RANDOM, 3, 40, 300);
+    float *const u = random_weights(&random, &b);
+    const size_t size = 2 * b.terms_count * OV_MONOMIALS, values = b.points.packs * OV_PACK;
+    float *const mark = test_alloc(size + values, sizeof *mark);
+    for (size_t k = 0; k < size + values; ++k)
+        mark[k] = 7.0f;
+    write_floats(*state, &weights, u, values);
+    write_floats(*state, &polynomial, mark, b.terms_count * OV_MONOMIALS);
+    b.operations.idle = &word;
+    for (cl_uint idle = 0; idle < 2; ++idle) {
+        write_floats(*state, &moments, mark, size);
+        write_floats(*state, &value, mark, values);
+        test_check(*state, ov_buffer_put(*state, &word, &idle, sizeof idle, "a word"));
+        test_check(*state, ov_moments(*state, &b.operations, &b.points, &b.terms, &b.lists,
+                                      &weights, &moments));
+        test_check(*state, ov_field_polynomial(*state, &b.operations, &b.points, &b.terms, &b.lists,
+                                               &polynomial, NULL, &value));
+        float *const sums = read_floats(*state, &moments, size);
+        float *const got = read_floats(*state, &value, values);
+        for (size_t k = 0; k < size; ++k)
+            assert_true((sums[k] == 7.0f) == (idle == 1));
+        for (size_t k = 0; k < b.count; ++k)
+            assert_true((got[k] == 7.0f) == (idle == 1));
+        free(sums);
+        free(got);
+    }
+    b.operations.idle = NULL;
+    free(u);
+    free(mark);
+    ov_buffer *const buffers[] = {&weights, &moments, &polynomial, &value, &word};
+    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
+        ov_buffer_destroy(buffers[k]);
+    bench_destroy(&b);
 }
 
 static void moments_equal_twin(void **state) {
@@ -129,9 +170,9 @@ static void long_lists_that_cancel(void **state) {
     for (size_t k = 0; k < count; ++k)
         u[k] = random_bits(&random) % 2 ? 1.0f : -1.0f;
     double *const got = moments_of(&b, u), *const weights = in_double(u, count);
-    reference_sum wanted[OV_MONOMIALS];
+    ov_twin_sum wanted[OV_MONOMIALS];
     double worst = 0.0;
-    reference_moments(&quadric, b.xyz, weights, count, wanted);
+    ov_twin_moments(&quadric, b.xyz, weights, count, wanted);
     for (size_t m = 0; m < OV_MONOMIALS; ++m)
         expect_close(got[m], wanted[m], 0.1, &worst, "moment", m);
     print_message("%zu weights of either sign: %.4f of 0.1\n", count, worst);
@@ -168,7 +209,7 @@ static void lattice_gives_gaussian_integrals(void **state) {
     double *const got = moments_of(&b, u);
 
     double r[3][3];
-    reference_rotation(ellipsoid.angle, r);
+    ov_twin_rotation(ellipsoid.angle, r);
     const double *const d = ellipsoid.decay;
     const double mass = ellipsoid.amplitude * pow(PI, 1.5) / sqrt(d[0] * d[1] * d[2]);
     expect_near(got[0], mass, 1e-5 * mass, "the integral of an ellipsoid");
@@ -250,7 +291,7 @@ static void empty_lists_give_zeros(void **state) {
 
 /* ---- residual ----------------------------------------------------------------------------- */
 
-/* reference_residual(), in the kernel's precision. */
+/* ov_twin_residual(), in the kernel's precision. */
 static float single_residual(float value, float target, float limit) {
     if (target > limit)
         return value < limit ? value - limit : 0.0f;
@@ -317,6 +358,7 @@ static void residual_equals_twin(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(idle_kernels_leave_results),
         cmocka_unit_test(moments_equal_twin),
         cmocka_unit_test(moments_of_every_list_length),
         cmocka_unit_test(totals_hold_two_floats),

@@ -147,6 +147,23 @@ static void box_of(const float *boxes, const ov_tree *tree, unsigned level, size
         value[k] = boxes[group * 6 * OV_GROUP + k * OV_GROUP + box % OV_GROUP];
 }
 
+/* The device makes the same of the leaves. */
+static void expect_tree_on_device(ovoid_context *context, const float *leaves, size_t count,
+                                  const ov_tree *wanted, const float *boxes, size_t floats) {
+    ov_buffer on_device = {0}, made = {0};
+    ov_tree tree;
+    if (count == 0 || count > test_size(count, 4200))
+        return;
+    write_floats(context, &on_device, leaves, 6 * count);
+    test_check(context, ov_tree_grow(context, &on_device, count, &tree, &made));
+    assert_memory_equal(&tree, wanted, sizeof tree);
+    float *const got = read_floats(context, &made, floats);
+    assert_memory_equal(got, boxes, floats * sizeof *got);
+    free(got);
+    ov_buffer_destroy(&on_device);
+    ov_buffer_destroy(&made);
+}
+
 /* Every box is exactly the hull of its children, level 0 holds the leaves, and what fills up a
  * group is empty. */
 static void expect_tree(ovoid_context *context, size_t count, uint64_t seed) {
@@ -192,6 +209,7 @@ static void expect_tree(ovoid_context *context, size_t count, uint64_t seed) {
         expected = used;
     }
     assert_int_equal(floats, groups * OV_GROUP * 6);
+    expect_tree_on_device(context, leaves, count, &tree, boxes, floats);
     if (count > 0) /* the last level is one group */
         assert_true(tree.boxes[tree.levels - 1] <= OV_GROUP);
     else
@@ -215,6 +233,10 @@ static void tree_has_a_limit(void **state) {
         ov_tree_build(*state, NULL, ((size_t)1 << (4 * OV_LEVELS)) + 1, &tree, &boxes, &floats),
         OVOID_ERROR_LIMIT, "boxes");
     assert_null(boxes);
+    test_refused(*state,
+                 ov_tree_grow(*state, &(ov_buffer){0}, ((size_t)1 << (4 * OV_LEVELS)) + 1, &tree,
+                              &(ov_buffer){0}),
+                 OVOID_ERROR_LIMIT, "boxes");
 }
 
 /* ---- packs -------------------------------------------------------------------------------- */

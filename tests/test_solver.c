@@ -4,7 +4,7 @@
  */
 #include "fit/adaptive/solver.h"
 #include "model/ellipsoid.h"
-#include "reference/factor.h"
+#include "selftest/twin_factor.h"
 #include "support.h"
 
 enum { P = OV_FACTOR_PARAMETERS, BLOCK = P * (P + 1) / 2 };
@@ -31,8 +31,8 @@ static void twin_is_the_derivative(void **state) {
             x[k] = random_uniform(&random, -1.0, 1.0);
         for (int k = 0; k < 3; ++k)
             y[k] = random_uniform(&random, -1.5, 1.5);
-        reference_jacobian(x, 1, y, row);
-        const double value = reference_factor_value(x, y);
+        ov_twin_jacobian(x, 1, y, row);
+        const double value = ov_twin_factor_value(x, y);
         for (int j = 0; j < P; ++j) {
             double slope[2];
             for (int half = 0; half < 2; ++half) {
@@ -43,7 +43,7 @@ static void twin_is_the_derivative(void **state) {
                 up[j] += h;
                 down[j] -= h;
                 slope[half] =
-                    (reference_factor_value(up, y) - reference_factor_value(down, y)) / (2.0 * h);
+                    (ov_twin_factor_value(up, y) - ov_twin_factor_value(down, y)) / (2.0 * h);
             }
             expect_near(row[j], (4.0 * slope[1] - slope[0]) / 3.0, 1e-7 * (1.0 + 10.0 * value),
                         "a derivative");
@@ -64,7 +64,7 @@ typedef struct start {
 static void run_start(ovoid_context *context, start *s, float lambda) {
     ov_kernel kernel = {0};
     ov_buffer factor = {0}, gram = {0}, moments = {0}, block = {0}, diagonal = {0}, x = {0},
-              r = {0}, p = {0}, polynomial = {0}, rz = {0};
+              r = {0}, p = {0}, polynomial = {0}, rz = {0}, state = {0};
     const cl_uint count = (cl_uint)s->count;
     ov_device *device;
     test_check(context, ov_device_get(context, &device));
@@ -83,11 +83,13 @@ static void run_start(ovoid_context *context, start *s, float lambda) {
         test_check(context, ov_buffer_reserve(context, vectors[k], s->count * P * 4, "vector"));
     test_check(context, ov_buffer_reserve(context, &block, s->count * BLOCK * 4, "blocks"));
     test_check(context, ov_buffer_reserve(context, &rz, groups * 4, "sums"));
-    test_check(context, OV_LAUNCH(context, &kernel, count, s->group, OV_ARG(count), OV_ARG(lambda),
-                                  OV_ARG(factor.memory), OV_ARG(gram.memory),
-                                  OV_ARG(moments.memory), OV_ARG(block.memory),
-                                  OV_ARG(diagonal.memory), OV_ARG(x.memory), OV_ARG(r.memory),
-                                  OV_ARG(p.memory), OV_ARG(polynomial.memory), OV_ARG(rz.memory)));
+    test_check(context, ov_buffer_reserve(context, &state, 8, "states"));
+    test_check(context,
+               OV_LAUNCH(context, &kernel, count, s->group, OV_ARG(count), OV_ARG(lambda),
+                         OV_ARG(factor.memory), OV_ARG(gram.memory), OV_ARG(moments.memory),
+                         OV_ARG(block.memory), OV_ARG(diagonal.memory), OV_ARG(x.memory),
+                         OV_ARG(r.memory), OV_ARG(p.memory), OV_ARG(polynomial.memory),
+                         OV_ARG(rz.memory), OV_ARG(state.memory)));
     s->block = read_floats(context, &block, s->count * BLOCK);
     s->diagonal = read_floats(context, &diagonal, s->count * P);
     s->step = read_floats(context, &x, s->count * P);
@@ -95,8 +97,8 @@ static void run_start(ovoid_context *context, start *s, float lambda) {
     s->p = read_floats(context, &p, s->count * P);
     s->polynomial = read_floats(context, &polynomial, s->count * P);
     s->rz = read_floats(context, &rz, groups);
-    ov_buffer *const buffers[] = {&factor, &gram, &moments, &block,      &diagonal,
-                                  &x,      &r,    &p,       &polynomial, &rz};
+    ov_buffer *const buffers[] = {&factor, &gram, &moments,    &block, &diagonal, &x,
+                                  &r,      &p,    &polynomial, &rz,    &state};
     for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
         ov_buffer_destroy(buffers[k]);
     ov_kernel_destroy(&kernel);
@@ -113,7 +115,7 @@ static void make_start(test_random *random, size_t count, start *s) {
     for (size_t i = 0; i < count; ++i) {
         double xyz[3 * POINTS], weight[POINTS];
         ov_quadric quadric;
-        reference_sum sums[OV_GRAM];
+        ov_twin_sum sums[OV_GRAM];
         random_factor(random, 4.0, s->x + i * P);
         for (size_t k = OV_FACTOR_L; k < P; ++k) /* floats, as the kernel sees them */
             s->x[i * P + k] = (float)s->x[i * P + k];
@@ -122,7 +124,7 @@ static void make_start(test_random *random, size_t count, start *s) {
             xyz[k] = quadric.centre[k % 3] + random_uniform(random, -2.0, 2.0);
         for (size_t k = 0; k < POINTS; ++k)
             weight[k] = random_uniform(random, 0.1, 1.0);
-        reference_gram(&quadric, xyz, weight, POINTS, sums);
+        ov_twin_gram(&quadric, xyz, weight, POINTS, sums);
         for (size_t m = 0; m < OV_GRAM; ++m)
             s->gram[i * OV_GRAM + m] = (float)sums[m].value;
         for (size_t m = 0; m < OV_MONOMIALS; ++m) { /* high and low parts, the low not rounding */
@@ -150,9 +152,9 @@ static void maps_equal_twin(void **state) {
     for (size_t i = 0; i < s.count; ++i) {
         double map[OV_MONOMIALS][P], left = 0.0, right = 0.0, parts = 0.0;
         const float *const p = s.p + i * P, *const r = s.r + i * P, *const c = s.polynomial + i * P;
-        reference_factor_map(s.x + i * P, map);
+        ov_twin_factor_map(s.x + i * P, map);
         for (size_t j = 0; j < P; ++j) {
-            reference_sum gradient = {0}, polynomial = {0};
+            ov_twin_sum gradient = {0}, polynomial = {0};
             for (size_t m = 0; m < OV_MONOMIALS; ++m) {
                 const float *const pair = s.moments + 2 * (i * OV_MONOMIALS + m);
                 const double moment = (double)pair[0] + pair[1];
@@ -186,7 +188,7 @@ static void twin_block(const double *x, const float *gram, double lambda, double
         for (int a = degree; a >= 0; --a)
             for (int b = degree - a; b >= 0; --b)
                 sum_of[a][b][degree - a - b] = gram[n++];
-    reference_factor_map(x, map);
+    ov_twin_factor_map(x, map);
     for (int i = 0; i < P; ++i)
         for (int j = 0; j < P; ++j) {
             block[i][j] = 0.0;
@@ -318,9 +320,10 @@ static double error_of(const problem *p, const double *step, double lambda) {
     double *const factored = test_alloc(size * size, sizeof *factored);
     double *const wanted = test_alloc(size, sizeof *wanted);
     double error = 0.0, whole = 0.0;
-    reference_system(p->x, count, p->b.xyz, p->weight, p->u, p->b.count, lambda, matrix, wanted);
+    assert_true(
+        ov_twin_system(p->x, count, p->b.xyz, p->weight, p->u, p->b.count, lambda, matrix, wanted));
     memcpy(factored, matrix, size * size * sizeof *matrix);
-    assert_true(reference_solve(factored, size, wanted));
+    assert_true(ov_twin_solve(factored, size, wanted));
     for (size_t i = 0; i < size; ++i)
         for (size_t j = 0; j < size; ++j) {
             const double entry = matrix[i * size + j];
@@ -399,45 +402,54 @@ static void alone_equals_together(void **state) {
     }
 }
 
-/* CPUs wait for a look at each fourth iteration, and all for the step; an iteration takes three
- * launches. */
+/* What is waited for is the step; an iteration takes three launches, and as many are started as the
+ * last solution took. */
 static void little_is_waited_for(void **state) {
     test_skip_simulated(*state);
     problem p;
     ov_solver solver = {0};
     create_problem(&p, *state, 20, 300, 0, 11);
-    free(solve(&p, &solver, 0.1, 1, 0.0));
+    free(solve(&p, &solver, 0.1, 25, 0.0));
     const ov_device *const device = p.b.context->device;
     const uint64_t reads = device->counts[OVOID_COUNT_BLOCKING_READS];
     const uint64_t launches = device->counts[OVOID_COUNT_LAUNCHES];
     free(solve(&p, &solver, 0.1, 25, 0.0));
-    assert_int_equal(device->counts[OVOID_COUNT_BLOCKING_READS] - reads,
-                     1 + (device->shape.lanes == 1 ? 25 / 4 : 0));
+    assert_int_equal(device->counts[OVOID_COUNT_BLOCKING_READS] - reads, 1);
     assert_int_equal(device->counts[OVOID_COUNT_LAUNCHES] - launches,
                      2 + 1 + 25 * 3); /* moments, gram, start */
     ov_solver_destroy(&solver);
     destroy_problem(&p);
 }
 
-/* Whether a look is waited for or lags an iteration, the step has the same bits. */
-static void lagging_changes_nothing(void **state) {
+/* However many iterations are started at once, the device stops at the first whose residual is
+ * small enough, and the step has the same bits. */
+static void the_device_stops(void **state) {
     test_skip_simulated(*state);
     problem p;
     create_problem(&p, *state, 20, 300, 0, 12);
     for (int apart = 0; apart < 2; ++apart) {
-        ov_solver waiting = {.apart = apart, .looks = OV_LOOKS_WAIT};
-        ov_solver lagging = {.apart = apart, .looks = OV_LOOKS_LAG};
-        double *const one = solve(&p, &waiting, 0.1, 100, 0.1);
-        double *const other = solve(&p, &lagging, 0.1, 100, 0.1);
-        print_message("%llu iterations, %llu lagging\n", (unsigned long long)waiting.iterations,
-                      (unsigned long long)lagging.iterations);
-        assert_int_equal(waiting.iterations, lagging.iterations);
-        assert_true(waiting.iterations % 4 == 0 && waiting.iterations < 100);
-        assert_memory_equal(one, other, 20 * P * sizeof *one);
+        ov_solver exact = {.apart = apart};
+        double *const one = solve(&p, &exact, 0.1, 100, 0.1);
+        const uint64_t taken = exact.iterations;
+        print_message("%llu iterations\n", (unsigned long long)taken);
+        assert_true(taken > 1 && taken < 100);
+        for (uint32_t last = 1; last < 60; last += 7) {
+            ov_solver other = {.apart = apart, .last = last};
+            double *const again = solve(&p, &other, 0.1, 100, 0.1);
+            assert_int_equal(other.iterations, taken);
+            assert_int_equal(other.last, taken);
+            assert_memory_equal(one, again, 20 * P * sizeof *one);
+            free(again);
+            ov_solver_destroy(&other);
+        }
+        ov_solver bounded = {.apart = apart};
+        double *const less = solve(&p, &bounded, 0.1, (uint32_t)taken - 1, 0.1);
+        assert_int_equal(bounded.iterations, taken - 1);
+        assert_memory_not_equal(one, less, 20 * P * sizeof *one);
+        free(less);
         free(one);
-        free(other);
-        ov_solver_destroy(&waiting);
-        ov_solver_destroy(&lagging);
+        ov_solver_destroy(&bounded);
+        ov_solver_destroy(&exact);
     }
     destroy_problem(&p);
 }
@@ -541,7 +553,7 @@ int main(void) {
         cmocka_unit_test(more_than_one_group),
         cmocka_unit_test(alone_equals_together),
         cmocka_unit_test(little_is_waited_for),
-        cmocka_unit_test(lagging_changes_nothing),
+        cmocka_unit_test(the_device_stops),
         cmocka_unit_test(ellipsoids_without_points),
         cmocka_unit_test(no_residual_no_step),
         cmocka_unit_test(solutions_repeat),

@@ -6,12 +6,12 @@ _Static_assert(OV_BRICK_X *OV_BRICK_Y *OV_BRICK_Z == OV_PACK, "a brick is a pack
 
 static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 
-/* Fills one brick's origin, its first point, and coordinates. */
+/* Fills one brick's origin, its first point, and unless packed is NULL coordinates. */
 static void lay_brick(const uint64_t at[3], const double step[3], float *origin, float *packed) {
     for (size_t axis = 0; axis < 3; ++axis)
         origin[axis] = ov_to_float((double)(at[axis] * brick[axis]) * step[axis]);
     origin[3] = OV_PACK;
-    for (uint64_t j = 0; j < OV_PACK; ++j) {
+    for (uint64_t j = 0; packed && j < OV_PACK; ++j) {
         uint64_t within[3];
         ov_brick_point(j, within);
         for (size_t axis = 0; axis < 3; ++axis) {
@@ -40,10 +40,12 @@ ovoid_status ov_bricks_order(ovoid_context *context, const uint64_t bricks[3], u
 }
 
 ovoid_status ov_bricks_upload(ovoid_context *context, const uint64_t bricks[3],
-                              const uint32_t *order, const double step[3], ov_points *points) {
+                              const uint32_t *order, const double step[3], bool alike,
+                              ov_points *points) {
     ovoid_status status = OVOID_OK;
     const size_t packs = (size_t)(bricks[0] * bricks[1] * bricks[2]);
-    float *const packed = ov_alloc(context, packs * 3 * OV_PACK, sizeof *packed, "lattice points");
+    float *const packed =
+        ov_alloc(context, (alike ? 1 : packs) * 3 * OV_PACK, sizeof *packed, "lattice points");
     points->pack_origin =
         ov_alloc(context, packs * 4, sizeof *points->pack_origin, "lattice bricks");
     if (!packed || !points->pack_origin) {
@@ -53,10 +55,12 @@ ovoid_status ov_bricks_upload(ovoid_context *context, const uint64_t bricks[3],
     for (size_t k = 0; k < packs; ++k) {
         const uint64_t at[3] = {order[k] % bricks[0], order[k] / bricks[0] % bricks[1],
                                 order[k] / (bricks[0] * bricks[1])};
-        lay_brick(at, step, points->pack_origin + 4 * k, packed + k * (3 * OV_PACK));
+        lay_brick(at, step, points->pack_origin + 4 * k,
+                  alike && k > 0 ? NULL : packed + k * (3 * OV_PACK));
     }
     points->count = packs * OV_PACK;
     points->packs = packs;
+    points->alike = alike;
     OV_TRY(ov_points_upload(context, packed, points));
 cleanup:
     free(packed);

@@ -18,8 +18,10 @@ static inline void ov_brick_point(uint64_t j, uint64_t within[3]) {
 ovoid_status ov_bricks_order(ovoid_context *context, const uint64_t bricks[3], uint32_t *order);
 
 /* Uploads the bricks as packs in this order, with points `step` angstrom apart and relative to the
- * first one. Frees with ov_points_destroy(). */
+ * first one. alike: each brick has its points where the first one has them about its origin, to
+ * rounding, and the device holds them once. Free with ov_points_destroy(). */
 ovoid_status ov_bricks_upload(ovoid_context *context, const uint64_t bricks[3],
-                              const uint32_t *order, const double step[3], ov_points *points);
+                              const uint32_t *order, const double step[3], bool alike,
+                              ov_points *points);
 
 #endif

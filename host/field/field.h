@@ -26,6 +26,8 @@ static inline float ov_to_float(double x) {
 typedef struct ov_points {
     size_t count;
     size_t packs;
+    bool alike;         /* each pack has the same points about its origin, and the device one of
+                           them for all: lists and ov_field() take such points, no more */
     double origin[3];   /* angstrom: what packs and terms are relative to */
     float *pack_origin; /* 4 per pack: x, y, z of its own origin, which its points are relative
                            to, and how many points it has; its last one repeated fills it up */
@@ -49,8 +51,8 @@ void ov_points_destroy(ov_points *points);
 /* How far (angstrom, along each axis) points of such a pack may be from its origin. */
 double ov_points_pack_reach(double resolution);
 
-/* Uploads points that are in packs already: packed holds OV_PACK x, y, z per pack, and all that is
- * the host's is set, except the tree, its boxes and rounding. */
+/* Uploads points that are in packs already: packed holds OV_PACK x, y, z per pack, or once where
+ * packs are alike, and all that is the host's is set, except the tree, its boxes and rounding. */
 ovoid_status ov_points_upload(ovoid_context *context, const float *packed, ov_points *points);
 
 /* Points of a pack, without those that fill it up. */
@@ -119,6 +121,10 @@ ovoid_status ov_sort_keys(ovoid_context *context, const uint64_t *keys, size_t c
 ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t count, ov_tree *tree,
                            float **boxes, size_t *floats);
 
+/* The same on the device, from leaf boxes there, without waiting: boxes is made large enough. */
+ovoid_status ov_tree_grow(ovoid_context *context, const ov_buffer *leaves, size_t count,
+                          ov_tree *tree, ov_buffer *boxes);
+
 /* Box `box` of a level, from boxes in the layout of ov_tree. */
 void ov_tree_box(const float *boxes, const ov_tree *tree, unsigned level, size_t box,
                  float value[6]);
@@ -183,6 +189,8 @@ void ov_lists_destroy(ov_lists *lists);
 
 typedef struct ov_operations {
     ov_kernel field, field_polynomial, field_gradient, moments, gram, residual;
+    const ov_buffer *idle; /* a word that is not 0 where ov_field_polynomial() and ov_moments() have
+                              nothing to do, and leave their results; NULL: they always have */
 } ov_operations;
 
 /* Work-group for kernels whose work-items do not share anything: one item on CPUs, where a driver

@@ -61,11 +61,11 @@ static ovoid_status reserve_values(ovoid_context *context, const ov_points *poin
 ovoid_status ov_field(ovoid_context *context, ov_operations *operations, const ov_points *points,
                       const ov_terms *terms, const ov_lists *lists, ov_buffer *value) {
     ovoid_status status = OVOID_OK;
-    const cl_uint packs = (cl_uint)points->packs;
+    const cl_uint packs = (cl_uint)points->packs, alike = points->alike;
     OV_TRY(make(context, &operations->field, "field", "field"));
     OV_TRY(reserve_values(context, points, value));
     OV_TRY(launch_packs(context, &operations->field, points->packs,
-                        ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
+                        ARGS(OV_ARG(packs), OV_ARG(alike), OV_ARG(points->xyz.memory),
                              OV_ARG(points->pack_origins.memory), OV_ARG(lists->pack_start.memory),
                              OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
                              OV_ARG(value->memory))));
@@ -79,11 +79,12 @@ ovoid_status ov_field_polynomial(ovoid_context *context, ov_operations *operatio
                                  const ov_buffer *weight, ov_buffer *value) {
     ovoid_status status = OVOID_OK;
     const cl_mem weights = weight ? weight->memory : NULL; /* null in the kernel, too */
+    const cl_mem idle = operations->idle ? operations->idle->memory : NULL;
     const cl_uint packs = (cl_uint)points->packs;
     OV_TRY(make(context, &operations->field_polynomial, "field", "field_polynomial"));
     OV_TRY(reserve_values(context, points, value));
     OV_TRY(launch_packs(context, &operations->field_polynomial, points->packs,
-                        ARGS(OV_ARG(packs), OV_ARG(points->xyz.memory),
+                        ARGS(OV_ARG(packs), OV_ARG(idle), OV_ARG(points->xyz.memory),
                              OV_ARG(points->pack_origins.memory), OV_ARG(lists->pack_start.memory),
                              OV_ARG(lists->pack_item.memory), OV_ARG(terms->device.memory),
                              OV_ARG(polynomial->memory), OV_ARG(weights), OV_ARG(value->memory))));
@@ -114,11 +115,12 @@ ovoid_status ov_moments(ovoid_context *context, ov_operations *operations, const
                         ov_buffer *result) {
     ovoid_status status = OVOID_OK;
     const cl_uint count = (cl_uint)terms->count;
+    const cl_mem idle = operations->idle ? operations->idle->memory : NULL;
     OV_TRY(make(context, &operations->moments, "moments", "moments"));
     OV_TRY(ov_buffer_reserve(context, result, terms->count * 2 * OV_MONOMIALS * sizeof(cl_float),
                              "moments"));
     OV_TRY(launch_terms(context, &operations->moments, terms->count,
-                        ARGS(OV_ARG(count), OV_ARG(points->xyz.memory),
+                        ARGS(OV_ARG(count), OV_ARG(idle), OV_ARG(points->xyz.memory),
                              OV_ARG(points->pack_origins.memory), OV_ARG(u->memory),
                              OV_ARG(lists->term_start.memory), OV_ARG(lists->term_item.memory),
                              OV_ARG(terms->device.memory), OV_ARG(result->memory))));

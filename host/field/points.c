@@ -23,8 +23,8 @@ static void empty_box(float box[BOX]) {
 
 static void widen_box(float box[BOX], const float other[BOX]) {
     for (int k = 0; k < 3; ++k) {
-        box[k] = fminf(box[k], other[k]);
-        box[k + 3] = fmaxf(box[k + 3], other[k + 3]);
+        box[k] = other[k] < box[k] ? other[k] : box[k]; /* fminf() is a call */
+        box[k + 3] = other[k + 3] > box[k + 3] ? other[k + 3] : box[k + 3];
     }
 }
 
@@ -67,10 +67,42 @@ static size_t plan_tree(size_t leaves, ov_tree *tree) {
     return total;
 }
 
-ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t count, ov_tree *tree,
-                           float **boxes, size_t *floats) {
+static ovoid_status check_leaves(ovoid_context *context, size_t count) {
     if (count > (size_t)1 << (4 * OV_LEVELS))
         return ov_fail(context, OVOID_ERROR_LIMIT, "%zu boxes are more than a tree holds", count);
+    return OVOID_OK;
+}
+
+ovoid_status ov_tree_grow(ovoid_context *context, const ov_buffer *leaves, size_t count,
+                          ov_tree *tree, ov_buffer *boxes) {
+    ovoid_status status = OVOID_OK;
+    ov_kernel lowest = {0}, above = {0};
+    ov_device *device;
+    const cl_uint total = (cl_uint)count;
+    OV_TRY(ov_device_get(context, &device));
+    OV_TRY(check_leaves(context, count));
+    const size_t groups = plan_tree(count, tree), group = ov_item_group(device);
+    OV_TRY(ov_kernel_create(context, "tree", "tree_leaves", &lowest));
+    OV_TRY(ov_kernel_create(context, "tree", "tree_level", &above));
+    OV_TRY(ov_buffer_reserve(context, boxes, groups * OV_GROUP * BOX * sizeof(cl_float),
+                             "a tree of boxes"));
+    OV_TRY(OV_LAUNCH(context, &lowest, groups_of(count), group, OV_ARG(total),
+                     OV_ARG(leaves->memory), OV_ARG(boxes->memory)));
+    for (unsigned level = 1; level < tree->levels; ++level)
+        OV_TRY(OV_LAUNCH(context, &above, groups_of(tree->boxes[level]), group,
+                         OV_ARG(tree->boxes[level]), OV_ARG(tree->groups[level - 1]),
+                         OV_ARG(tree->groups[level]), OV_ARG(boxes->memory)));
+cleanup:
+    ov_kernel_destroy(&lowest);
+    ov_kernel_destroy(&above);
+    return status;
+}
+
+ovoid_status ov_tree_build(ovoid_context *context, const float *leaves, size_t count, ov_tree *tree,
+                           float **boxes, size_t *floats) {
+    const ovoid_status status = check_leaves(context, count);
+    if (status != OVOID_OK)
+        return status;
     const size_t groups = plan_tree(count, tree);
     float *const made = ov_alloc(context, groups * OV_GROUP * BOX, sizeof *made, "a tree of boxes");
     if (!made)
@@ -150,8 +182,8 @@ void ov_pack_box(const float *pack, float box[BOX]) {
         const float *const at = pack + axis * OV_PACK;
         box[axis] = box[axis + 3] = at[0];
         for (size_t k = 1; k < OV_PACK; ++k) {
-            box[axis] = fminf(box[axis], at[k]);
-            box[axis + 3] = fmaxf(box[axis + 3], at[k]);
+            box[axis] = at[k] < box[axis] ? at[k] : box[axis];
+            box[axis + 3] = at[k] > box[axis + 3] ? at[k] : box[axis + 3];
         }
     }
 }
@@ -173,7 +205,7 @@ static void box_packs(const float *packed, ov_points *points, float *leaves) {
     float largest = 0.0f;
     for (size_t pack = 0; pack < points->packs; ++pack) {
         float *const leaf = leaves + pack * BOX;
-        ov_pack_box(packed + pack * (3 * OV_PACK), leaf);
+        ov_pack_box(packed + (points->alike ? 0 : pack) * (3 * OV_PACK), leaf);
         for (size_t k = 0; k < BOX; ++k) {
             const double side = (double)points->pack_origin[4 * pack + k % 3] + (double)leaf[k];
             leaf[k] = k < 3 ? round_down(side) : round_up(side);
@@ -186,7 +218,7 @@ static void box_packs(const float *packed, ov_points *points, float *leaves) {
 ovoid_status ov_points_upload(ovoid_context *context, const float *packed, ov_points *points) {
     ovoid_status status = OVOID_OK;
     size_t floats = 0;
-    const size_t bytes = points->packs * 3 * OV_PACK * sizeof *packed;
+    const size_t bytes = (points->alike ? 1 : points->packs) * 3 * OV_PACK * sizeof *packed;
     float *const leaves = ov_alloc(context, points->packs * BOX, sizeof *leaves, "boxes of packs");
     if (!leaves)
         return OVOID_ERROR_MEMORY;

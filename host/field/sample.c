@@ -91,7 +91,7 @@ static ovoid_status lay_piece(ovoid_context *context, sampler *s) {
     const ovoid_status status = ov_bricks_order(context, bricks, s->order);
     if (status != OVOID_OK)
         return status;
-    return ov_bricks_upload(context, bricks, s->order, s->lattice->step, &s->points);
+    return ov_bricks_upload(context, bricks, s->order, s->lattice->step, false, &s->points);
 }
 
 /* phi at the points of one piece, into s->values. */

@@ -46,10 +46,11 @@ typedef struct measuring {
     ov_facets *facets;
     const ov_sites *sites;
     size_t group, batch;
-    cl_uint each;   /* points of a work-item */
-    bool use_bound; /* the distances are bounds already */
-    ov_tree tree;   /* over the leaves */
-    float box[BOX]; /* about the chunk on the device, with use_bound */
+    cl_uint each;           /* points of a work-item */
+    const ov_buffer *there; /* all sites on the device, in batches that are not waited for; NULL */
+    bool use_bound;         /* the distances are bounds already */
+    ov_tree tree;           /* over the leaves */
+    float box[BOX];         /* about the chunk on the device, with use_bound */
 } measuring;
 
 /* A trail's sites from `first` on. */
@@ -91,25 +92,38 @@ static bool out_of_reach(const measuring *m, const float *xyz, size_t count, con
     return box_distance(box, m->box) > most;
 }
 
-/* From `count` sites to the chunk on the device. */
-static ovoid_status measure_batch(ovoid_context *context, measuring *m, const float *xyz,
-                                  size_t count, float *squared) {
+/* From `count` sites to the chunk on the device: from number `from` of m->there on, or else those
+ * given. The squared distances are left on the device, from number `to` on. */
+static ovoid_status launch_batch(ovoid_context *context, measuring *m, const float *xyz,
+                                 size_t first, size_t count, size_t result) {
     ovoid_status status = OVOID_OK;
     ov_meter *const meter = m->meter;
     const ov_facets *const facets = m->facets;
     const cl_uint total = (cl_uint)count, each = m->each, first_leaf = (cl_uint)facets->first,
-                  end_leaf = (cl_uint)facets->end, use_bound = m->use_bound;
+                  end_leaf = (cl_uint)facets->end, use_bound = m->use_bound,
+                  from = m->there ? (cl_uint)first : 0, to = (cl_uint)result;
     const cl_float enough = (cl_float)(meter->enough * meter->enough);
     const cl_float4 low = {{m->box[0], m->box[1], m->box[2], 0.0f}},
                     high = {{m->box[3], m->box[4], m->box[5], 0.0f}};
-    OV_TRY(ov_buffer_write(context, &meter->xyz, 0, xyz, 3 * count * sizeof *xyz));
-    if (m->use_bound)
-        OV_TRY(ov_buffer_write(context, &meter->result, 0, squared, count * sizeof *squared));
+    const cl_mem points = m->there ? m->there->memory : meter->xyz.memory;
+    if (!m->there)
+        OV_TRY(ov_buffer_write(context, &meter->xyz, 0, xyz, 3 * count * sizeof *xyz));
     OV_TRY(OV_LAUNCH(context, &meter->distances, (count + each - 1) / each, m->group, OV_ARG(total),
-                     OV_ARG(each), OV_ARG(meter->xyz.memory), OV_ARG(m->tree),
+                     OV_ARG(each), OV_ARG(from), OV_ARG(points), OV_ARG(m->tree),
                      OV_ARG(facets->boxes.memory), OV_ARG(first_leaf), OV_ARG(end_leaf),
                      OV_ARG(low), OV_ARG(high), OV_ARG(facets->packed.memory), OV_ARG(use_bound),
-                     OV_ARG(enough), OV_ARG(meter->result.memory)));
+                     OV_ARG(enough), OV_ARG(to), OV_ARG(meter->result.memory)));
+cleanup:
+    return status;
+}
+
+static ovoid_status measure_batch(ovoid_context *context, measuring *m, const float *xyz,
+                                  size_t count, float *squared) {
+    ovoid_status status = OVOID_OK;
+    ov_meter *const meter = m->meter;
+    if (m->use_bound)
+        OV_TRY(ov_buffer_write(context, &meter->result, 0, squared, count * sizeof *squared));
+    OV_TRY(launch_batch(context, m, xyz, 0, count, 0));
     OV_TRY(ov_buffer_read(context, &meter->result, 0, squared, count * sizeof *squared));
 cleanup:
     return status;
@@ -155,6 +169,7 @@ static ovoid_status measure_sites(ovoid_context *context, measuring *m, float *s
     ovoid_status status = OVOID_OK;
     const size_t leaves = m->facets->leaves, chunk = m->facets->chunk;
     if (leaves > chunk) {
+        OV_TRY(ov_facets_boxes(context, m->facets));
         m->tree = coarse_tree(&m->facets->tree);
         OV_TRY(measure_leaves(context, m, true, 0, (leaves + OV_GROUP - 1) / OV_GROUP, squared));
         m->use_bound = true;
@@ -243,6 +258,54 @@ ovoid_status ov_trail_distances(ovoid_context *context, ov_meter *meter, ov_face
     put_distances(from, found, distance);
 cleanup:
     free(squared);
+    return status;
+}
+
+/* ---- without waiting ---------------------------------------------------------------------- */
+
+/* From all sites, which are on the device, to the facets, which are one chunk. */
+static ovoid_status launch_all(ovoid_context *context, measuring *m) {
+    ovoid_status status = OVOID_OK;
+    ov_meter *const meter = m->meter;
+    const size_t count = m->sites->count;
+    OV_TRY(ov_facets_load(context, m->facets, false, 0, m->facets->leaves));
+    OV_TRY(ov_buffer_reserve(context, &meter->result, count * sizeof(cl_float), "distances"));
+    m->tree = m->facets->tree;
+    for (size_t k = 0, size; k < count; k += size) {
+        if (meter->watch)
+            OV_TRY(ov_watch_ask(context, meter->watch));
+        size = count - k < m->batch ? count - k : m->batch;
+        OV_TRY(launch_batch(context, m, NULL, k, size, k));
+    }
+cleanup:
+    return status;
+}
+
+ovoid_status ov_vertex_distances_begin(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                                       const ov_facets *from, float *distance) {
+    ovoid_status status = OVOID_OK;
+    const ov_sites sites = {.count = from->trail.vertices, .trail = &from->trail};
+    measuring m = {.meter = meter, .facets = facets, .sites = &sites, .there = ov_facets_xyz(from)};
+    meter->later = (ov_later){0};
+    if (from->trail.vertex || facets->leaves > facets->chunk || facets->leaves == 0)
+        return ov_trail_distances(context, meter, facets, &from->trail, distance);
+    OV_TRY(prepare(context, &m));
+    OV_TRY(launch_all(context, &m));
+    OV_TRY(ov_buffer_read_later(context, &meter->result, 0, distance,
+                                sites.count * sizeof *distance, &meter->later));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_vertex_distances_end(ovoid_context *context, ov_meter *meter, const ov_facets *from,
+                                     float *distance) {
+    ovoid_status status = OVOID_OK;
+    if (!meter->later.event)
+        return OVOID_OK;
+    OV_TRY(ov_later_end(context, &meter->later));
+    OV_TRY(check_distances(context, distance, from->trail.vertices));
+    put_distances(&from->trail, distance, distance);
+cleanup:
     return status;
 }
 

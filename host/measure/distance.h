@@ -17,6 +17,7 @@ typedef struct ov_meter {
     double enough; /* angstrom: a distance of at most this may be told as more, up to this */
     ov_kernel distances;
     ov_buffer xyz, result; /* device */
+    ov_later later;        /* the read of distances that are under way */
     float *points;         /* of a batch of a trail's */
     size_t points_capacity;
 } ov_meter;
@@ -41,6 +42,14 @@ ovoid_status ov_facets_distances(ovoid_context *context, ov_meter *meter, ov_fac
  * others. */
 ovoid_status ov_trail_distances(ovoid_context *context, ov_meter *meter, ov_facets *facets,
                                 const ov_trail *from, float *distance);
+
+/* As ov_trail_distances() from all vertices of another surface on the device, without waiting where
+ * that can be: distance is to stay until ov_vertex_distances_end(), which is to follow, after
+ * failures too, and which fails for what begin did not wait for. */
+ovoid_status ov_vertex_distances_begin(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                                       const ov_facets *from, float *distance);
+ovoid_status ov_vertex_distances_end(ovoid_context *context, ov_meter *meter, const ov_facets *from,
+                                     float *distance);
 
 /* ovoid_mesh_distances() that tells the distance of each vertex of both meshes, where not NULL;
  * those of vertices that are left out stay as they are. */

@@ -13,8 +13,11 @@
 #include "measure/trail.h"
 #include "shared.h"
 
-/* Leaves of OV_LEAF triangles on the device at a time (38 MB), no fewer than OV_GROUP. */
+/* Leaves of OV_LEAF triangles on the device at a time, no fewer than OV_GROUP: at least so many (38
+ * MB), or what this share of its memory holds, since a second chunk has all points looked at again.
+ */
 #define OV_FACETS_CHUNK ((size_t)1 << 15)
+#define OV_FACETS_SHARE (1.0 / 32.0)
 
 /* {0} is empty and holds no surface. What it has of kernels and memory serves the next surface. */
 typedef struct ov_facets {
@@ -23,19 +26,22 @@ typedef struct ov_facets {
     size_t chunk;     /* as above, or less in tests */
     ov_tree tree;
     size_t leaves;
-    float *box; /* of each leaf: low x, y, z, high x, y, z */
+    float *box; /* of each leaf: low x, y, z, high x, y, z, */
+    bool boxed; /* once they have been asked for */
     size_t box_capacity;
     uint32_t *listed; /* corners of triangles that do not follow one another in the mesh */
     size_t listed_capacity;
     ov_kernel pack;
     ov_buffer boxes;              /* device: the tree's */
-    ov_buffer vertices, corners;  /* device: of the mesh, and of the chunk's triangles */
+    ov_buffer vertices, corners;  /* device: of the mesh, and of the chunk's triangles, unless the
+                                     mesh has left its own there */
     ov_buffer packed, leaf_boxes; /* device: the chunk as kernels/distance.cl has it */
     size_t first, end;            /* leaves of the chunk; none where they are equal */
     bool coarse;                  /* see ov_facets_load() */
 } ov_facets;
 
-/* Replaces the surface. The origin of a light mesh costs least. No triangle is no error. After a
+/* Replaces the surface. The origin of a light mesh costs least, and of one that is on the device
+ * nothing goes there. No triangle is no error. After a
  * failure there is no surface. */
 ovoid_status ov_facets_set(ovoid_context *context, ov_facets *facets, const ov_trail *trail,
                            const double origin[3]);
@@ -45,6 +51,12 @@ void ov_facets_destroy(ov_facets *facets);
  * triangle of each leaf of a group, and so lie in that group's box one level up the tree. */
 ovoid_status ov_facets_load(ovoid_context *context, ov_facets *facets, bool coarse, size_t first,
                             size_t end);
+
+/* The vertices of its mesh on the device, 3 floats each. */
+const ov_buffer *ov_facets_xyz(const ov_facets *facets);
+
+/* Sees to it that the host has the leaves' boxes: it chooses among chunks by them. */
+ovoid_status ov_facets_boxes(ovoid_context *context, ov_facets *facets);
 
 /* Writes the vertices from `first` on as the device has them; vertex: which ones, NULL: all. */
 void ov_facets_round(const ov_facets *facets, const ovoid_mesh *mesh, const uint32_t *vertex,

@@ -13,23 +13,26 @@
 /* Where spots are looked for, distances below this share of theirs are only bounded. */
 #define ENOUGH 0.8
 
-/* The light mesh of some bodies, its area and its volume; the normals have done their part then.
- * *mesh is NULL where there is no surface. */
+/* The light mesh of some bodies, with normals where its area and its volume are wanted; its
+ * components are still to be found. *mesh is NULL where there is no surface. */
 static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
-                                ovoid_mesh **mesh, ov_content *content) {
+                                bool normals, ovoid_mesh **mesh) {
+    *mesh = NULL;
     const ovoid_status status =
         ov_mesh_bodies_light(judge->context, judge->marcher, bodies, count, &judge->meshing,
-                             judge->origin, &judge->watch, mesh);
-    if (status == OVOID_OK) {
-        if (content)
-            *content = ov_mesh_smooth(*mesh, false);
-        free((*mesh)->normals);
-        (*mesh)->normals = NULL;
-    }
-    if (status != OVOID_ERROR_EMPTY)
-        return status;
-    *mesh = NULL;
-    return OVOID_OK;
+                             judge->origin, &judge->watch, normals, mesh);
+    return status == OVOID_ERROR_EMPTY ? OVOID_OK : status;
+}
+
+/* Finds its components and, unless content is NULL, its area and volume, after which the normals
+ * have done their part. */
+static ovoid_status finish_mesh(const ov_judge *judge, ovoid_mesh *mesh, ov_content *content) {
+    const ovoid_status status = ov_mesh_finish(judge->context, mesh);
+    if (status == OVOID_OK && content)
+        *content = ov_mesh_smooth(mesh, false);
+    free(mesh->normals);
+    mesh->normals = NULL;
+    return status;
 }
 
 /* The middle of the atoms' box. */
@@ -57,9 +60,10 @@ static ovoid_status mesh_original(ov_judge *judge, const double *xyzr, size_t at
         return OVOID_ERROR_MEMORY;
     for (size_t i = 0; i < atoms; ++i)
         ov_body_of_atom(xyzr + 4 * i, decay, &bodies[i]);
-    const ovoid_status status = mesh_bodies(judge, bodies, atoms, &judge->mesh, &judge->content);
+    const ovoid_status status = mesh_bodies(judge, bodies, atoms, true, &judge->mesh);
     free(bodies);
-    return status;
+    return status != OVOID_OK || !judge->mesh ? status
+                                              : finish_mesh(judge, judge->mesh, &judge->content);
 }
 
 ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
@@ -72,6 +76,7 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     middle_of(xyzr, atoms, made.origin);
     OV_TRY(ov_marcher_create(context, &made.marcher));
     OV_TRY(mesh_original(&made, xyzr, atoms, decay));
+    ov_marcher_stay(made.marcher);
     if (made.mesh) {
         OV_TRY(ov_trail_create(context, made.mesh, false, &made.trail));
         OV_TRY(ov_facets_set(context, &made.facets, &made.trail, made.origin));
@@ -86,6 +91,7 @@ cleanup:
 void ov_judge_destroy(ov_judge *judge) {
     ov_marcher_destroy(&judge->marcher);
     ov_meter_destroy(&judge->meter);
+    ov_meter_destroy(&judge->back);
     ov_facets_destroy(&judge->facets);
     ov_facets_destroy(&judge->other);
     ov_trail_destroy(&judge->trail);
@@ -94,7 +100,7 @@ void ov_judge_destroy(ov_judge *judge) {
 }
 
 static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
-                               ovoid_mesh **mesh, ov_content *content) {
+                               bool normals, ovoid_mesh **mesh) {
     ov_body *const bodies = ov_alloc(judge->context, count, sizeof *bodies, "ellipsoids");
     if (!bodies)
         return OVOID_ERROR_MEMORY;
@@ -103,7 +109,7 @@ static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size
         ov_ellipsoid_of_quadric(&quadrics[i], &ellipsoid);
         ov_body_of_ellipsoid(&ellipsoid, &bodies[i]);
     }
-    const ovoid_status status = mesh_bodies(judge, bodies, count, mesh, content);
+    const ovoid_status status = mesh_bodies(judge, bodies, count, normals, mesh);
     free(bodies);
     if (status != OVOID_ERROR_LIMIT)
         return status;
@@ -208,7 +214,9 @@ static void trial_destroy(trial *t) {
     ovoid_mesh_destroy(&t->mesh);
 }
 
-static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
+/* Where both surfaces are there, how far they are from one another; the device looks for that while
+ * the host finds out what else there is to know of the model's. */
+static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t, ov_content *content) {
     ovoid_status status = OVOID_OK;
     ov_trail trail = {0};
     ovoid_context *const context = judge->context;
@@ -219,14 +227,20 @@ static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    judge->meter.watch = &judge->watch;
-    judge->meter.enough = enough;
+    judge->meter.watch = judge->back.watch = &judge->watch;
+    judge->meter.enough = judge->back.enough = enough;
     OV_TRY(ov_trail_create(context, t->mesh, false, &trail));
     OV_TRY(ov_facets_set(context, &judge->other, &trail, judge->origin));
-    OV_TRY(
-        ov_trail_distances(context, &judge->meter, &judge->other, &judge->trail, t->from_original));
-    OV_TRY(ov_trail_distances(context, &judge->meter, &judge->facets, &trail, t->from_model));
+    OV_TRY(ov_vertex_distances_begin(context, &judge->meter, &judge->other, &judge->facets,
+                                     t->from_original));
+    OV_TRY(ov_vertex_distances_begin(context, &judge->back, &judge->facets, &judge->other,
+                                     t->from_model));
+    OV_TRY(finish_mesh(judge, t->mesh, content));
+    OV_TRY(ov_vertex_distances_end(context, &judge->meter, &judge->facets, t->from_original));
+    OV_TRY(ov_vertex_distances_end(context, &judge->back, &judge->other, t->from_model));
 cleanup:
+    ov_later_end(context, &judge->meter.later); /* what is under way writes to the trial */
+    ov_later_end(context, &judge->back.later);
     ov_trail_destroy(&trail);
     return status;
 }
@@ -237,10 +251,12 @@ static ovoid_status try_model(ov_judge *judge, const ov_quadric *quadrics, size_
                               ov_judgement *judgement) {
     ovoid_status status = OVOID_OK;
     *judgement = (ov_judgement){.hausdorff = INFINITY, .deviation = INFINITY, .score = INFINITY};
-    OV_TRY(mesh_model(judge, quadrics, count, &t->mesh, content));
-    if (!has_outer(t->mesh) || !has_outer(judge->mesh))
+    OV_TRY(mesh_model(judge, quadrics, count, content, &t->mesh));
+    if (!t->mesh || !has_outer(judge->mesh))
         goto cleanup;
-    OV_TRY(measure_trial(judge, enough, t));
+    OV_TRY(measure_trial(judge, enough, t, content));
+    if (!has_outer(t->mesh))
+        goto cleanup;
     *judgement =
         (ov_judgement){.valid = true, .area_error = NAN, .volume_ratio = NAN, .score = NAN};
     judge_distances(judge->mesh, t->from_original, judgement);
@@ -309,8 +325,10 @@ ovoid_status ov_judge_volume(ov_judge *judge, const ov_quadric *quadrics, size_t
     *ratio = 1.0;
     if (!judge->mesh)
         return OVOID_OK;
-    const ovoid_status status = mesh_model(judge, quadrics, count, &mesh, &content);
+    ovoid_status status = mesh_model(judge, quadrics, count, true, &mesh);
     if (mesh)
+        status = finish_mesh(judge, mesh, &content);
+    if (mesh && status == OVOID_OK)
         *ratio = content.volume / judge->content.volume;
     ovoid_mesh_destroy(&mesh);
     return status;

@@ -20,9 +20,9 @@ typedef struct ov_judge {
     double root_2d; /* sqrt(2 decay), angstrom^-1 */
     ov_watch watch; /* asked during whatever takes long */
     ov_marcher *marcher;
-    ov_meter meter;
-    ov_facets facets; /* of the original */
-    ov_facets other;  /* of the model at hand */
+    ov_meter meter, back; /* of distances from the original, and to it */
+    ov_facets facets;     /* of the original */
+    ov_facets other;      /* of the model at hand */
 } ov_judge;
 
 typedef struct ov_judgement {

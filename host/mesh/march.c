@@ -19,6 +19,8 @@
 #define CROSSING 4   /* values per brick: number of the first vertex, masks along x, y, z */
 #define BRICK_RUN 32 /* bricks per work-item of the kernels over all bricks, on CPUs */
 
+enum { SIGNS, COUNT, NUMBER, GET, PUT, VERTICES, BOXES, TRIANGLES, REFINE, PLACE, KERNELS };
+
 /* What a piece leaves behind for those before it: its faces. */
 typedef struct piece_faces {
     float *value;      /* OV_PACK per face brick */
@@ -30,6 +32,8 @@ typedef struct ov_marcher {
     const ov_body *bodies;
     const ovoid_mesh_options *options;
     const double *origin; /* of the offsets of a light mesh, else NULL */
+    bool bare;            /* a light mesh without normals is wanted */
+    bool resident;        /* the light mesh so far is on the device, too */
     const ov_watch *watch;
     ov_pieces pieces;
     piece_faces *faces; /* of each piece; empty where not needed, or no longer */
@@ -47,32 +51,33 @@ typedef struct ov_marcher {
     size_t xyz_capacity, offsets_capacity, normals_capacity, triangle_capacity;
     size_t vertices, triangles;
     size_t new_vertices, new_triangles; /* of the piece */
-    bool ghosts_empty;                  /* on the device */
 
     ov_brick_grid grid;
+    uint64_t wanted[3];  /* points of pieces, so that the grid stays; 0: nothing is wanted */
     double grid_spacing; /* angstrom */
+    bool ghosts_empty;   /* on the device */
     ov_points points;
+    ov_points vertex_points; /* packs of the piece's vertices: their boxes alone */
     ov_terms terms;
-    ov_lists lists;
+    ov_lists lists, vertex_lists; /* of bricks, and of packs of vertices */
     ov_operations operations;
-    ov_kernel signs, count, get, put, fill_vertices, fill_boxes, fill_triangles, refine;
-    ov_buffer value, sign, crossing, found, box, cases, list, edge, t, normal, corners;
-    ov_buffer face_list, ghost_list, place, values, crossings;
+    ov_kernel kernel[KERNELS];
+    ov_buffer value, sign, crossing, found, box, cases, list, totals, edge, t, normal, corners;
+    ov_buffer face_list, ghost_list, place, brick_of, values, crossings;
+    ov_buffer placed, placed_normals;          /* vertices of the light mesh, or of the piece */
+    size_t placed_vertices, corners_triangles; /* of the last mesh: what the next may have */
     size_t group;
     cl_uint run;
 
     ov_quadric *quadrics; /* of one piece */
     size_t quadrics_capacity;
-    cl_uint *host_found; /* vertices and triangles of each brick, as of march_count() */
     float *ghost_value;
     cl_uint *ghost_crossing;
-    cl_uint *active; /* entries of march_vertices()'s list */
-    size_t active_count;
+    cl_uint active; /* entries of march_vertices()'s list */
     cl_uint *edges; /* of the piece's vertices, in packs */
     size_t edges_capacity;
-    cl_int *lattice_boxes; /* of packs of vertices, in lattice points and in angstrom */
-    float *boxes, *refined;
-    size_t lattice_boxes_capacity, boxes_capacity, refined_capacity;
+    float *refined;
+    size_t refined_capacity;
 } marcher;
 
 static const uint64_t brick_points[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
@@ -80,21 +85,29 @@ static const uint64_t brick_points[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 /* ---- setting up --------------------------------------------------------------------------- */
 
 static ovoid_status make_kernels(ovoid_context *context, marcher *m) {
-    if (m->refine.handle)
-        return OVOID_OK;
-    static const char *const names[] = {
-        "march_signs",    "march_count", "march_get",       "march_put",
-        "march_vertices", "march_boxes", "march_triangles", "march_refine",
+    static const char *const names[KERNELS] = {
+        "march_signs",    "march_count", "march_number",    "march_get",    "march_put",
+        "march_vertices", "march_boxes", "march_triangles", "march_refine", "march_place",
     };
-    ov_kernel *const kernels[] = {
-        &m->signs,      &m->count,          &m->get,   &m->put, &m->fill_vertices,
-        &m->fill_boxes, &m->fill_triangles, &m->refine};
-    for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k) {
-        const ovoid_status status = ov_kernel_create(context, "march", names[k], kernels[k]);
-        if (status != OVOID_OK)
-            return status;
-    }
-    return OVOID_OK;
+    ovoid_status status = OVOID_OK;
+    for (size_t k = 0; k < KERNELS && status == OVOID_OK; ++k)
+        if (!m->kernel[k].handle)
+            status = ov_kernel_create(context, "march", names[k], &m->kernel[k]);
+    return status;
+}
+
+/* Where the bricks are in the padded grid, by place. */
+static ovoid_status put_brick_numbers(ovoid_context *context, marcher *m) {
+    const ov_brick_grid *const grid = &m->grid;
+    cl_uint *const number = ov_alloc(context, grid->padded_total, sizeof *number, "lattice bricks");
+    if (!number)
+        return OVOID_ERROR_MEMORY;
+    for (size_t k = 0; k < grid->padded_total; ++k)
+        number[grid->place[k]] = (cl_uint)k;
+    const ovoid_status status = ov_buffer_put(
+        context, &m->brick_of, number, grid->padded_total * sizeof *number, "lattice bricks");
+    free(number);
+    return status;
 }
 
 static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
@@ -108,6 +121,7 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
                          "lattice bricks"));
     OV_TRY(
         ov_buffer_put(context, &m->place, grid->place, padded * sizeof(cl_uint), "lattice bricks"));
+    OV_TRY(put_brick_numbers(context, m));
     OV_TRY(
         ov_buffer_reserve(context, &m->value, padded * OV_PACK * sizeof(float), "lattice values"));
     OV_TRY(ov_buffer_reserve(context, &m->sign, padded * sizeof(cl_uint), "signs of bricks"));
@@ -119,11 +133,12 @@ static ovoid_status reserve_piece(ovoid_context *context, marcher *m) {
         ov_buffer_reserve(context, &m->values, moved * OV_PACK * sizeof(float), "values at faces"));
     OV_TRY(ov_buffer_reserve(context, &m->crossings, moved * CROSSING * sizeof(cl_uint),
                              "crossings at faces"));
-    m->host_found = ov_alloc(context, grid->total, sizeof(cl_uint), "vertices of bricks");
-    m->active = ov_alloc(context, grid->total * 4, sizeof(cl_uint), "bricks at the surface");
+    OV_TRY(ov_buffer_reserve(context, &m->list, grid->total * 4 * sizeof(cl_uint),
+                             "bricks at the surface"));
+    OV_TRY(ov_buffer_reserve(context, &m->totals, 3 * sizeof(cl_uint), "vertices of bricks"));
     m->ghost_value = ov_alloc(context, moved * OV_PACK, sizeof(float), "values at faces");
     m->ghost_crossing = ov_alloc(context, moved * CROSSING, sizeof(cl_uint), "crossings at faces");
-    if (!m->host_found || !m->active || !m->ghost_value || !m->ghost_crossing)
+    if (!m->ghost_value || !m->ghost_crossing)
         status = OVOID_ERROR_MEMORY;
 cleanup:
     return status;
@@ -137,14 +152,14 @@ static bool has_grid(const marcher *m) {
 }
 
 static void drop_grid(marcher *m) {
-    void *const memory[] = {m->host_found, m->active, m->ghost_value, m->ghost_crossing};
-    for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
-        free(memory[k]);
-    m->host_found = m->active = m->ghost_crossing = NULL;
+    free(m->ghost_value);
+    free(m->ghost_crossing);
+    m->ghost_crossing = NULL;
     m->ghost_value = NULL;
     ov_brick_grid_destroy(&m->grid);
     ov_points_destroy(&m->points);
     m->grid_spacing = 0.0;
+    m->ghosts_empty = false;
 }
 
 /* A grid of bricks for pieces of this size, unless the last mesh's is one. */
@@ -155,7 +170,7 @@ static ovoid_status lay_grid(ovoid_context *context, marcher *m) {
         return OVOID_OK;
     drop_grid(m);
     OV_TRY(ov_brick_grid_create(context, m->pieces.size, &m->grid));
-    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, &m->points));
+    OV_TRY(ov_bricks_upload(context, m->grid.bricks, m->grid.curve, step, true, &m->points));
     OV_TRY(reserve_piece(context, m));
     m->grid_spacing = m->pieces.spacing;
 cleanup:
@@ -239,7 +254,7 @@ static ovoid_status fill_ghosts(ovoid_context *context, marcher *m) {
                            grid->ghosts * OV_PACK * sizeof *m->ghost_value));
     OV_TRY(ov_buffer_write(context, &m->crossings, 0, m->ghost_crossing,
                            grid->ghosts * CROSSING * sizeof *m->ghost_crossing));
-    OV_TRY(OV_LAUNCH(context, &m->put, grid->ghosts, m->group, OV_ARG(count),
+    OV_TRY(OV_LAUNCH(context, &m->kernel[PUT], grid->ghosts, m->group, OV_ARG(count),
                      OV_ARG(m->ghost_list.memory), OV_ARG(m->place.memory),
                      OV_ARG(m->values.memory), OV_ARG(m->crossings.memory), OV_ARG(m->value.memory),
                      OV_ARG(m->crossing.memory)));
@@ -268,9 +283,10 @@ static ovoid_status keep_faces(ovoid_context *context, marcher *m, size_t piece)
         ov_alloc(context, faces * CROSSING, sizeof *kept->crossing, "crossings at faces");
     if (!kept->value || !kept->crossing)
         return OVOID_ERROR_MEMORY;
-    OV_TRY(OV_LAUNCH(context, &m->get, faces, m->group, OV_ARG(count), OV_ARG(m->face_list.memory),
-                     OV_ARG(m->place.memory), OV_ARG(m->value.memory), OV_ARG(m->crossing.memory),
-                     OV_ARG(m->values.memory), OV_ARG(m->crossings.memory)));
+    OV_TRY(OV_LAUNCH(context, &m->kernel[GET], faces, m->group, OV_ARG(count),
+                     OV_ARG(m->face_list.memory), OV_ARG(m->place.memory), OV_ARG(m->value.memory),
+                     OV_ARG(m->crossing.memory), OV_ARG(m->values.memory),
+                     OV_ARG(m->crossings.memory)));
     OV_TRY(
         ov_buffer_read(context, &m->values, 0, kept->value, faces * OV_PACK * sizeof *kept->value));
     OV_TRY(ov_buffer_read(context, &m->crossings, 0, kept->crossing,
@@ -295,7 +311,8 @@ static void drop_old_faces(marcher *m, size_t piece) {
 
 /* ---- one piece ---------------------------------------------------------------------------- */
 
-static ovoid_status evaluate(ovoid_context *context, marcher *m, size_t piece) {
+/* Where the piece is, and its terms. */
+static ovoid_status set_terms(ovoid_context *context, marcher *m, size_t piece) {
     ovoid_status status = OVOID_OK;
     const size_t first = m->pieces.start[piece], count = m->pieces.start[piece + 1] - first;
     uint64_t key = m->pieces.key[piece];
@@ -312,99 +329,97 @@ static ovoid_status evaluate(ovoid_context *context, marcher *m, size_t piece) {
         m->quadrics[k] = m->bodies[m->pieces.term[first + k]].quadric;
     OV_TRY(ov_terms_set(context, &m->terms, m->quadrics, count, m->corner,
                         OV_MARCH_CUTOFF * m->options->isovalue));
-    m->lists.packs_only = true;
-    OV_TRY(ov_lists_build(context, &m->lists, &m->points, &m->terms, 0.0));
-    OV_TRY(ov_field(context, &m->operations, &m->points, &m->terms, &m->lists, &m->value));
 cleanup:
     return status;
 }
 
-/* Numbers vertices and triangles along the curve, and lists the bricks that have some. */
-static ovoid_status number_bricks(ovoid_context *context, marcher *m) {
-    const ov_brick_grid *const grid = &m->grid;
-    const uint64_t nx = grid->bricks[0], ny = grid->bricks[1];
-    size_t vertices = 0, triangles = 0;
-    m->active_count = 0;
-    for (size_t i = 0; i < grid->total; ++i) {
-        const uint32_t k = grid->curve[i];
-        const cl_uint found = m->host_found[k];
-        if (found == 0)
-            continue;
-        cl_uint *const entry = m->active + 4 * m->active_count++;
-        entry[0] = ov_brick_number(grid, k % nx, k / nx % ny, k / (nx * ny));
-        entry[1] = (cl_uint)vertices;
-        entry[2] = (cl_uint)triangles;
-        entry[3] = (cl_uint)(m->vertices + vertices);
-        vertices += found & 255u;
-        triangles += found >> 8;
-    }
-    m->new_vertices = vertices;
-    m->new_triangles = triangles;
-    if (m->vertices + vertices > UINT32_MAX)
-        return ov_fail(context, OVOID_ERROR_LIMIT,
-                       "the mesh has more than 2^32 vertices; use a larger spacing");
-    return OVOID_OK;
+/* Begins to make lists in the memory of the last ones if there were any, and says so; else makes
+ * them. */
+static ovoid_status begin_lists(ovoid_context *context, marcher *m, ov_lists *lists,
+                                const ov_points *points, bool *begun) {
+    *begun = *begun && ov_lists_built(lists);
+    lists->packs_only = true;
+    return *begun ? ov_lists_begin(context, lists, points, &m->terms, 0.0)
+                  : ov_lists_build(context, lists, points, &m->terms, 0.0);
 }
 
-/* Signs, crossed edges, numbers. */
+/* Signs, crossed edges, numbers of vertices and triangles along the curve. */
 static ovoid_status classify(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     const ov_brick_grid *const grid = &m->grid;
-    const cl_uint padded = (cl_uint)grid->padded_total, nx = (cl_uint)grid->bricks[0],
-                  ny = (cl_uint)grid->bricks[1], nz = (cl_uint)grid->bricks[2];
+    const cl_uint padded = (cl_uint)grid->padded_total, total = (cl_uint)grid->total,
+                  nx = (cl_uint)grid->bricks[0], ny = (cl_uint)grid->bricks[1],
+                  nz = (cl_uint)grid->bricks[2], before = (cl_uint)m->vertices;
     const cl_float isovalue = (cl_float)m->options->isovalue;
-    OV_TRY(OV_LAUNCH(context, &m->signs, (padded + m->run - 1) / m->run, m->group, OV_ARG(padded),
-                     OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->place.memory),
+    const size_t scan = m->run > 1 ? 1 : OV_SCAN_GROUP;
+    OV_TRY(OV_LAUNCH(context, &m->kernel[SIGNS], (padded + m->run - 1) / m->run, m->group,
+                     OV_ARG(padded), OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->brick_of.memory),
                      OV_ARG(m->value.memory), OV_ARG(m->sign.memory)));
-    OV_TRY(OV_LAUNCH(context, &m->count, (grid->total + m->run - 1) / m->run, m->group, OV_ARG(nx),
-                     OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->sign.memory),
-                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory), OV_ARG(m->found.memory)));
-    OV_TRY(
-        ov_buffer_read(context, &m->found, 0, m->host_found, grid->total * sizeof *m->host_found));
-    OV_TRY(number_bricks(context, m));
+    OV_TRY(OV_LAUNCH(context, &m->kernel[COUNT], (total + m->run - 1) / m->run, m->group,
+                     OV_ARG(nx), OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->place.memory),
+                     OV_ARG(m->sign.memory), OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
+                     OV_ARG(m->found.memory)));
+    OV_TRY(OV_LAUNCH(context, &m->kernel[NUMBER], scan, scan, OV_ARG(total), OV_ARG(before),
+                     OV_ARG(m->brick_of.memory), OV_ARG(m->found.memory), OV_ARG(m->list.memory),
+                     OV_ARG(m->totals.memory)));
+cleanup:
+    return status;
+}
+
+/* phi at the lattice points, and what is found between them. */
+static ovoid_status look(ovoid_context *context, marcher *m, bool begin, bool *whole) {
+    ovoid_status status = OVOID_OK;
+    bool begun = begin;
+    cl_uint totals[3];
+    OV_TRY(begin_lists(context, m, &m->lists, &m->points, &begun));
+    OV_TRY(ov_field(context, &m->operations, &m->points, &m->terms, &m->lists, &m->value));
+    OV_TRY(fill_ghosts(context, m));
+    OV_TRY(classify(context, m));
+    OV_TRY(ov_buffer_read(context, &m->totals, 0, totals, sizeof totals));
+    m->active = totals[0];
+    m->new_vertices = totals[1];
+    m->new_triangles = totals[2];
+cleanup:
+    *whole = true;
+    if (begun && status == OVOID_OK)
+        status = ov_lists_end(context, &m->lists, whole);
+    else if (begun)
+        ov_later_end(context, &m->lists.later);
+    return status;
+}
+
+static ovoid_status evaluate(ovoid_context *context, marcher *m, size_t piece) {
+    ovoid_status status = OVOID_OK;
+    bool whole;
+    OV_TRY(set_terms(context, m, piece));
+    OV_TRY(look(context, m, true, &whole));
+    if (!whole) /* there were more pairs than ever before */
+        OV_TRY(look(context, m, false, &whole));
+    if (m->vertices + m->new_vertices > UINT32_MAX)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "the mesh has more than 2^32 vertices; use a larger spacing");
 cleanup:
     return status;
 }
 
 /* Lattice coordinates within the piece and axis of an edge (see march_vertices()). */
 static cl_uint read_edge(cl_uint edge, cl_uint at[3]) {
-    at[0] = edge & 127u;
-    at[1] = edge >> 7 & 127u;
-    at[2] = edge >> 14 & 63u;
-    return edge >> 20 & 3u;
-}
-
-/* The box of each pack of vertices. */
-static ovoid_status box_packs(ovoid_context *context, marcher *m, size_t packs) {
-    ovoid_status status = OVOID_OK;
-    const cl_uint packs_count = (cl_uint)packs, vertices = (cl_uint)m->new_vertices;
-    OV_TRY(ov_buffer_reserve(context, &m->box, packs * BOX * sizeof(cl_int), "boxes of vertices"));
-    OV_TRY(OV_LAUNCH(context, &m->fill_boxes, packs, m->group, OV_ARG(packs_count),
-                     OV_ARG(vertices), OV_ARG(m->edge.memory), OV_ARG(m->t.memory),
-                     OV_ARG(m->box.memory)));
-    OV_TRY(ov_grow(context, &m->lattice_boxes, &m->lattice_boxes_capacity, packs * BOX,
-                   sizeof *m->lattice_boxes, "boxes of vertices"));
-    OV_TRY(ov_grow(context, &m->boxes, &m->boxes_capacity, packs * BOX, sizeof *m->boxes,
-                   "boxes of vertices"));
-    OV_TRY(ov_buffer_read(context, &m->box, 0, m->lattice_boxes,
-                          packs * BOX * sizeof *m->lattice_boxes));
-    for (size_t k = 0; k < packs * BOX; ++k)
-        m->boxes[k] = (float)(m->lattice_boxes[k] * m->pieces.spacing);
-cleanup:
-    return status;
+    at[0] = edge & 255u;
+    at[1] = edge >> 8 & 255u;
+    at[2] = edge >> 16 & 255u;
+    return edge >> 24 & 3u;
 }
 
 /* Edges, numbers and first positions of the piece's vertices. */
 static ovoid_status fill_vertices(ovoid_context *context, marcher *m, size_t packs) {
     ovoid_status status = OVOID_OK;
     const size_t room = packs * OV_PACK;
-    const cl_uint active = (cl_uint)m->active_count, nx = (cl_uint)m->grid.bricks[0],
-                  ny = (cl_uint)m->grid.bricks[1];
+    const cl_uint nx = (cl_uint)m->grid.bricks[0], ny = (cl_uint)m->grid.bricks[1];
     const cl_float isovalue = (cl_float)m->options->isovalue;
     const cl_int logarithmic = m->options->vertices == OVOID_VERTEX_EXACT;
     OV_TRY(ov_buffer_reserve(context, &m->edge, room * sizeof(cl_uint), "edges of vertices"));
     OV_TRY(ov_buffer_reserve(context, &m->t, room * sizeof(cl_float), "vertices"));
-    OV_TRY(OV_LAUNCH(context, &m->fill_vertices, m->active_count, m->group, OV_ARG(active),
+    OV_TRY(OV_LAUNCH(context, &m->kernel[VERTICES], m->active, m->group, OV_ARG(m->active),
                      OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(isovalue),
                      OV_ARG(logarithmic), OV_ARG(m->place.memory), OV_ARG(m->value.memory),
                      OV_ARG(m->crossing.memory), OV_ARG(m->edge.memory), OV_ARG(m->t.memory)));
@@ -412,19 +427,21 @@ cleanup:
     return status;
 }
 
-/* Lists of the terms that reach the packs of vertices. */
-static ovoid_status list_terms(ovoid_context *context, marcher *m, size_t packs) {
+/* The box of each pack of vertices, and the tree over them. */
+static ovoid_status box_packs(ovoid_context *context, marcher *m, size_t packs) {
     ovoid_status status = OVOID_OK;
-    ov_points points = {.count = packs * OV_PACK, .packs = packs};
-    float *tree = NULL;
-    size_t floats = 0;
-    OV_TRY(box_packs(context, m, packs));
-    OV_TRY(ov_tree_build(context, m->boxes, packs, &points.tree, &tree, &floats));
-    OV_TRY(ov_buffer_put(context, &points.boxes, tree, floats * sizeof *tree, "boxes of vertices"));
-    OV_TRY(ov_lists_build(context, &m->lists, &points, &m->terms, 0.0));
+    const cl_uint packs_count = (cl_uint)packs, vertices = (cl_uint)m->new_vertices;
+    const cl_float spacing = (cl_float)m->pieces.spacing;
+    ov_points *const points = &m->vertex_points;
+    points->count = packs * OV_PACK;
+    points->packs = packs;
+    OV_TRY(
+        ov_buffer_reserve(context, &m->box, packs * BOX * sizeof(cl_float), "boxes of vertices"));
+    OV_TRY(OV_LAUNCH(context, &m->kernel[BOXES], packs, m->group, OV_ARG(packs_count),
+                     OV_ARG(vertices), OV_ARG(spacing), OV_ARG(m->edge.memory), OV_ARG(m->t.memory),
+                     OV_ARG(m->box.memory)));
+    OV_TRY(ov_tree_grow(context, &m->box, packs, &points->tree, &points->boxes));
 cleanup:
-    free(tree);
-    ov_points_destroy(&points);
     return status;
 }
 
@@ -438,14 +455,34 @@ static ovoid_status refine(ovoid_context *context, marcher *m, size_t packs) {
     OV_TRY(ov_device_get(context, &device));
     OV_TRY(
         ov_buffer_reserve(context, &m->normal, packs * 3 * OV_PACK * sizeof(cl_float), "normals"));
-    OV_TRY(OV_LAUNCH(context, &m->refine, packs * device->shape.lanes, m->group,
-                     OV_ARG(packs_count), OV_ARG(spacing), OV_ARG(isovalue), OV_ARG(steps),
-                     OV_ARG(close), OV_ARG(m->edge.memory), OV_ARG(m->lists.pack_start.memory),
-                     OV_ARG(m->lists.pack_item.memory), OV_ARG(m->terms.device.memory),
-                     OV_ARG(m->t.memory), OV_ARG(m->normal.memory)));
+    OV_TRY(OV_LAUNCH(
+        context, &m->kernel[REFINE], packs * device->shape.lanes, m->group, OV_ARG(packs_count),
+        OV_ARG(spacing), OV_ARG(isovalue), OV_ARG(steps), OV_ARG(close), OV_ARG(m->edge.memory),
+        OV_ARG(m->vertex_lists.pack_start.memory), OV_ARG(m->vertex_lists.pack_item.memory),
+        OV_ARG(m->terms.device.memory), OV_ARG(m->t.memory), OV_ARG(m->normal.memory)));
 cleanup:
     return status;
 }
+
+/* Puts the vertices on the surface. */
+static ovoid_status make_vertices(ovoid_context *context, marcher *m, size_t packs, bool begin,
+                                  bool *whole) {
+    ovoid_status status = OVOID_OK;
+    bool begun = begin;
+    OV_TRY(fill_vertices(context, m, packs));
+    OV_TRY(box_packs(context, m, packs));
+    OV_TRY(begin_lists(context, m, &m->vertex_lists, &m->vertex_points, &begun));
+    status = refine(context, m, packs);
+    *whole = true;
+    if (begun && status == OVOID_OK)
+        status = ov_lists_end(context, &m->vertex_lists, whole);
+    else if (begun)
+        ov_later_end(context, &m->vertex_lists.later);
+cleanup:
+    return status;
+}
+
+/* ---- from the device ------------------------------------------------------------------------ */
 
 static ovoid_status grow_vertices(ovoid_context *context, marcher *m, size_t total) {
     ovoid_status status = OVOID_OK;
@@ -457,8 +494,9 @@ static ovoid_status grow_vertices(ovoid_context *context, marcher *m, size_t tot
     if (!m->origin)
         OV_TRY(ov_grow(context, &m->edge_of, &m->edge_of_capacity, total, sizeof *m->edge_of,
                        "vertices"));
-    OV_TRY(ov_grow(context, &m->normals, &m->normals_capacity, 3 * total, sizeof *m->normals,
-                   "normals"));
+    if (!m->bare)
+        OV_TRY(ov_grow(context, &m->normals, &m->normals_capacity, 3 * total, sizeof *m->normals,
+                       "normals"));
 cleanup:
     return status;
 }
@@ -487,8 +525,7 @@ static ovoid_status take_vertices(ovoid_context *context, marcher *m, size_t pac
         const float *const n = normal + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
         cl_uint at[3];
         const cl_uint along = read_edge(m->edges[k], at);
-        if (m->edge_of)
-            m->edge_of[m->vertices + k] = (uint8_t)along;
+        m->edge_of[m->vertices + k] = (uint8_t)along;
         for (cl_uint axis = 0; axis < 3; ++axis) {
             const int64_t index =
                 m->pieces.origin[axis] + (int64_t)(m->at[axis] * m->pieces.size[axis] + at[axis]);
@@ -501,42 +538,117 @@ cleanup:
     return status;
 }
 
-static ovoid_status take_triangles(ovoid_context *context, marcher *m) {
+/* Where the piece's part of the light mesh begins on the device: behind the pieces before, as long
+ * as there is room for all, else at the beginning. */
+static ovoid_status reserve_light(ovoid_context *context, marcher *m, cl_uint *vertices,
+                                  cl_uint *triangles) {
     ovoid_status status = OVOID_OK;
-    const size_t corners = 3 * m->new_triangles, before = 3 * m->triangles;
-    const cl_uint active = (cl_uint)m->active_count, nx = (cl_uint)m->grid.bricks[0],
-                  ny = (cl_uint)m->grid.bricks[1];
-    OV_TRY(ov_grow(context, &m->triangle, &m->triangle_capacity, before + corners,
-                   sizeof *m->triangle, "triangles"));
-    OV_TRY(ov_buffer_reserve(context, &m->corners, corners * sizeof(cl_uint), "triangles"));
-    OV_TRY(OV_LAUNCH(context, &m->fill_triangles, m->active_count, m->group, OV_ARG(active),
-                     OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(m->sign.memory),
-                     OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
-                     OV_ARG(m->corners.memory)));
-    OV_TRY(ov_buffer_read(context, &m->corners, 0, m->triangle + before,
-                          corners * sizeof *m->triangle));
-    m->triangles += m->new_triangles;
+    const size_t offset = 3 * sizeof(cl_float), corner = 3 * sizeof(cl_uint);
+    const size_t more = m->vertices + m->new_vertices, most = m->triangles + m->new_triangles;
+    if (m->vertices > 0 && (more * offset > m->placed.bytes || most * corner > m->corners.bytes ||
+                            (!m->bare && more * offset > m->placed_normals.bytes)))
+        m->resident = false;
+    *vertices = m->resident ? (cl_uint)m->vertices : 0;
+    *triangles = m->resident ? (cl_uint)m->triangles : 0;
+    const size_t room = *vertices + m->new_vertices, expected = m->placed_vertices;
+    OV_TRY(ov_buffer_reserve(context, &m->placed, (room > expected ? room : expected) * offset,
+                             "vertices"));
+    if (!m->bare)
+        OV_TRY(ov_buffer_reserve(context, &m->placed_normals,
+                                 (room > expected ? room : expected) * offset, "normals"));
+    const size_t corners = *triangles + m->new_triangles;
+    OV_TRY(ov_buffer_reserve(
+        context, &m->corners,
+        (corners > m->corners_triangles ? corners : m->corners_triangles) * corner, "triangles"));
 cleanup:
     return status;
+}
+
+/* The corner of the piece from the origin, as floats and what these leave. */
+static void split_corner(const marcher *m, cl_float4 *corner, cl_float4 *rest) {
+    *corner = *rest = (cl_float4){{0.0f, 0.0f, 0.0f, 0.0f}};
+    for (size_t k = 0; k < 3; ++k) {
+        const double exact = m->corner[k] - m->origin[k];
+        corner->s[k] = ov_to_float(exact);
+        rest->s[k] = (float)(exact - (double)corner->s[k]);
+    }
+}
+
+static ovoid_status place_vertices(ovoid_context *context, marcher *m, size_t packs,
+                                   cl_uint before) {
+    const cl_uint count = (cl_uint)m->new_vertices;
+    const cl_float spacing = (cl_float)m->pieces.spacing;
+    const cl_mem normal = m->bare ? NULL : m->normal.memory,
+                 normals = m->bare ? NULL : m->placed_normals.memory; /* null in the kernel, too */
+    cl_float4 corner, rest;
+    split_corner(m, &corner, &rest);
+    return OV_LAUNCH(context, &m->kernel[PLACE], packs, m->group, OV_ARG(count), OV_ARG(before),
+                     OV_ARG(spacing), OV_ARG(corner), OV_ARG(rest), OV_ARG(m->edge.memory),
+                     OV_ARG(m->t.memory), OV_ARG(normal), OV_ARG(m->placed.memory),
+                     OV_ARG(normals));
+}
+
+static ovoid_status fill_triangles(ovoid_context *context, marcher *m, cl_uint before) {
+    const cl_uint nx = (cl_uint)m->grid.bricks[0], ny = (cl_uint)m->grid.bricks[1];
+    return OV_LAUNCH(context, &m->kernel[TRIANGLES], m->active, m->group, OV_ARG(m->active),
+                     OV_ARG(before), OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny),
+                     OV_ARG(m->sign.memory), OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
+                     OV_ARG(m->corners.memory));
+}
+
+/* Appends what the device has of the piece's part of a light mesh, in one round trip. */
+static ovoid_status take_light(ovoid_context *context, marcher *m, cl_uint vertices,
+                               cl_uint triangles) {
+    ovoid_status status = OVOID_OK;
+    const size_t each = 3 * sizeof(cl_float), bytes = m->new_vertices * each;
+    ov_later offsets = {0}, normals = {0};
+    OV_TRY(grow_vertices(context, m, m->vertices + m->new_vertices));
+    OV_TRY(ov_buffer_read_later(context, &m->placed, vertices * each, m->offsets + 3 * m->vertices,
+                                bytes, &offsets));
+    if (!m->bare)
+        OV_TRY(ov_buffer_read_later(context, &m->placed_normals, vertices * each,
+                                    m->normals + 3 * m->vertices, bytes, &normals));
+    OV_TRY(ov_buffer_read(context, &m->corners, triangles * each, m->triangle + 3 * m->triangles,
+                          m->new_triangles * each));
+cleanup:;
+    const ovoid_status one = ov_later_end(context, &offsets),
+                       other = ov_later_end(context, &normals);
+    return status != OVOID_OK ? status : one != OVOID_OK ? one : other;
+}
+
+static ovoid_status take_corners(ovoid_context *context, marcher *m) {
+    return ov_buffer_read(context, &m->corners, 0, m->triangle + 3 * m->triangles,
+                          3 * m->new_triangles * sizeof *m->triangle);
 }
 
 /* The current piece's part of the mesh. */
 static ovoid_status take_piece(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     const size_t packs = (m->new_vertices + OV_PACK - 1) / OV_PACK;
-    if (m->active_count == 0)
+    const size_t corners = 3 * (m->triangles + m->new_triangles);
+    cl_uint vertices = 0, triangles = 0;
+    bool whole = true;
+    if (m->active == 0)
         return OVOID_OK;
-    OV_TRY(ov_buffer_put(context, &m->list, m->active, m->active_count * 4 * sizeof *m->active,
-                         "bricks at the surface"));
+    OV_TRY(ov_grow(context, &m->triangle, &m->triangle_capacity, corners, sizeof *m->triangle,
+                   "triangles"));
+    if (m->origin)
+        OV_TRY(reserve_light(context, m, &vertices, &triangles));
+    else
+        OV_TRY(ov_buffer_reserve(context, &m->corners, 3 * m->new_triangles * sizeof(cl_uint),
+                                 "triangles"));
     if (m->new_vertices > 0)
-        OV_TRY(fill_vertices(context, m, packs));
-    OV_TRY(take_triangles(context, m));
-    if (m->new_vertices > 0) {
-        OV_TRY(list_terms(context, m, packs));
-        OV_TRY(refine(context, m, packs));
+        OV_TRY(make_vertices(context, m, packs, true, &whole));
+    if (!whole) /* there were more pairs than ever before */
+        OV_TRY(make_vertices(context, m, packs, false, &whole));
+    OV_TRY(fill_triangles(context, m, triangles));
+    if (m->origin)
+        OV_TRY(place_vertices(context, m, packs, vertices));
+    else if (m->new_vertices > 0)
         OV_TRY(take_vertices(context, m, packs));
-    }
+    OV_TRY(m->origin ? take_light(context, m, vertices, triangles) : take_corners(context, m));
     m->vertices += m->new_vertices;
+    m->triangles += m->new_triangles;
 cleanup:
     return status;
 }
@@ -577,8 +689,6 @@ static ovoid_status march_pieces(ovoid_context *context, marcher *m) {
             OV_TRY(ov_progress_step(context, pieces - 1 - piece, pieces));
         drop_old_faces(m, piece);
         OV_TRY(evaluate(context, m, piece));
-        OV_TRY(fill_ghosts(context, m));
-        OV_TRY(classify(context, m));
         OV_TRY(take_piece(context, m));
         OV_TRY(keep_faces(context, m, piece));
         if (m->vertices == 0)
@@ -611,7 +721,8 @@ static void drop_replaced(marcher *m, const bool *replaced, uint32_t *number) {
                 m->offsets[3 * kept + k] = m->offsets[3 * v + k];
             else
                 m->xyz[3 * kept + k] = m->xyz[3 * v + k];
-            m->normals[3 * kept + k] = m->normals[3 * v + k];
+            if (!m->bare)
+                m->normals[3 * kept + k] = m->normals[3 * v + k];
         }
         if (m->edge_of)
             m->edge_of[kept] = m->edge_of[v];
@@ -640,7 +751,8 @@ static ovoid_status append_specks(ovoid_context *context, marcher *m, const ov_s
                    sizeof *m->triangle, "triangles"));
     for (size_t k = 0; k < 3 * specks->vertices; ++k) {
         put_coordinate(m, 3 * m->vertices + k, specks->xyz[k]);
-        m->normals[3 * m->vertices + k] = specks->normals[k];
+        if (!m->bare)
+            m->normals[3 * m->vertices + k] = specks->normals[k];
     }
     if (m->edge_of)
         memcpy(m->edge_of + m->vertices, specks->edge, specks->vertices);
@@ -675,6 +787,7 @@ static ovoid_status add_specks(ovoid_context *context, marcher *m, size_t count)
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
+    m->resident = false;
     drop_replaced(m, replaced, number);
     OV_TRY(append_specks(context, m, &specks));
 cleanup:
@@ -705,7 +818,7 @@ static void triangle_normal(const marcher *m, const uint32_t corner[3], double n
 /* Gives a vertex the mean normal of its triangles, or any unit vector if they have no area. */
 static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
     size_t missing = 0;
-    for (size_t k = 0; k < m->vertices; ++k)
+    for (size_t k = 0; !m->bare && k < m->vertices; ++k)
         missing += vanishes(m->normals + 3 * k);
     if (missing == 0)
         return OVOID_OK;
@@ -752,23 +865,23 @@ static void end_mesh(marcher *m) {
 
 /* Frees what it works with. */
 static void release_work(marcher *m) {
-    ov_buffer *const buffers[] = {&m->value,      &m->sign,   &m->crossing, &m->found,
-                                  &m->box,        &m->cases,  &m->list,     &m->edge,
-                                  &m->t,          &m->normal, &m->corners,  &m->face_list,
-                                  &m->ghost_list, &m->place,  &m->values,   &m->crossings};
-    ov_kernel *const kernels[] = {
-        &m->signs,      &m->count,          &m->get,   &m->put, &m->fill_vertices,
-        &m->fill_boxes, &m->fill_triangles, &m->refine};
-    void *const memory[] = {m->quadrics, m->edges, m->lattice_boxes, m->boxes, m->refined};
+    ov_buffer *const buffers[] = {&m->value,      &m->sign,     &m->crossing, &m->found,
+                                  &m->box,        &m->cases,    &m->list,     &m->edge,
+                                  &m->t,          &m->normal,   &m->corners,  &m->face_list,
+                                  &m->ghost_list, &m->place,    &m->values,   &m->crossings,
+                                  &m->totals,     &m->brick_of, &m->placed,   &m->placed_normals};
+    void *const memory[] = {m->quadrics, m->edges, m->refined};
     drop_grid(m);
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
-    for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)
-        ov_kernel_destroy(kernels[k]);
+    for (size_t k = 0; k < KERNELS; ++k)
+        ov_kernel_destroy(&m->kernel[k]);
     for (size_t k = 0; k < sizeof memory / sizeof memory[0]; ++k)
         free(memory[k]);
+    ov_points_destroy(&m->vertex_points);
     ov_terms_destroy(&m->terms);
     ov_lists_destroy(&m->lists);
+    ov_lists_destroy(&m->vertex_lists);
     ov_operations_destroy(&m->operations);
     memset((char *)m + offsetof(marcher, grid), 0, sizeof *m - offsetof(marcher, grid));
 }
@@ -780,6 +893,17 @@ static void shrink(void *array_pointer, size_t bytes) {
     less = array && bytes > 0 ? realloc(array, bytes) : NULL;
     if (less)
         memcpy(array_pointer, &less, sizeof less);
+}
+
+/* Hands over what the device has of a light mesh. The next one may be a little larger. */
+static void adopt_device(marcher *m, ovoid_mesh *mesh) {
+    m->placed_vertices = m->vertices + m->vertices / 8;
+    m->corners_triangles = m->triangles + m->triangles / 8;
+    if (!m->resident)
+        return;
+    mesh->on_device[OV_ON_DEVICE_OFFSETS] = m->placed;
+    mesh->on_device[OV_ON_DEVICE_CORNERS] = m->corners;
+    m->placed = m->corners = (ov_buffer){0};
 }
 
 /* Hands the arrays over. */
@@ -801,38 +925,48 @@ static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh)
     (*mesh)->along_curve = true;
     (*mesh)->spacing = m->options->spacing;
     (*mesh)->missed = m->missed;
+    if (m->origin)
+        adopt_device(m, *mesh);
     (*mesh)->edge = m->edge_of;
     m->edge_of = NULL;
     return OVOID_OK;
 }
 
-/* Where there are so many more pieces than ones with a surface, smaller pieces are tried; and what
- * a piece costs beside its points, in points. */
+/* Where there are so many more pieces than ones with a surface, small pieces are tried, and ones of
+ * a middle size where pieces have so many points that much of them may be empty; and what a piece
+ * costs beside its points, in points. */
 #define EMPTY_SHARE 8.0
-#define OVERHEAD 5e4
-static const uint64_t sparse_limits[][3] = {{64, 64, 32}, {32, 32, 16}, {16, 16, 8}};
+#define EMPTY_POINTS 2e6
+#define OVERHEAD 2e5
+static const uint64_t sparse_limits[][3] = {
+    {128, 128, 64}, {64, 64, 32}, {32, 32, 16}, {16, 16, 8}};
+
+static double points_of(const ov_pieces *pieces) {
+    return (double)pieces->size[0] * (double)pieces->size[1] * (double)pieces->size[2];
+}
 
 static double cost_of(const ov_pieces *pieces) {
-    return (double)pieces->pieces *
-           (OVERHEAD + (double)pieces->size[0] * (double)pieces->size[1] * (double)pieces->size[2]);
+    return (double)pieces->pieces * (OVERHEAD + points_of(pieces));
 }
 
 /* Cuts the lattice into pieces: small ones where terms are few and far apart. */
 static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
                          const uint64_t limit[3]) {
     ovoid_status status = OVOID_OK;
+    bool sparse;
     const ovoid_mesh_options *const o = m->options;
     const double cutoff = OV_MARCH_CUTOFF * o->isovalue;
     ov_pieces *const best = &m->pieces;
-    OV_TRY(
-        ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit, best));
-    if ((double)best->count[0] * (double)best->count[1] * (double)best->count[2] <=
-        EMPTY_SHARE * (double)best->pieces)
-        goto cleanup;
+    OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit,
+                            m->wanted, best));
+    sparse = (double)best->count[0] * (double)best->count[1] * (double)best->count[2] >
+             EMPTY_SHARE * (double)best->pieces;
     for (size_t k = 0; k < sizeof sparse_limits / sizeof *sparse_limits; ++k) {
         ov_pieces other;
+        if (k == 0 ? points_of(best) <= EMPTY_POINTS : !sparse)
+            continue;
         OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing,
-                                sparse_limits[k], &other));
+                                sparse_limits[k], m->wanted, &other));
         if (cost_of(&other) < cost_of(best)) {
             const ov_pieces swap = *best;
             *best = other;
@@ -850,6 +984,7 @@ typedef struct plan_of_mesh {
     const double *origin; /* of a light mesh, else NULL */
     const ov_watch *watch;
     bool specks;
+    bool bare; /* without normals; light */
 } plan_of_mesh;
 
 static ovoid_status march_with(ovoid_context *context, marcher *m, size_t count,
@@ -877,12 +1012,23 @@ static ovoid_status march(ovoid_context *context, marcher *kept, const ov_body *
     m->options = options;
     m->origin = how->origin;
     m->watch = how->watch;
+    m->bare = how->bare;
+    m->resident = kept && how->origin;
     ovoid_status status = march_with(context, m, count, how);
     if (!kept)
         release_work(m); /* what is left is the mesh */
     if (status == OVOID_OK)
         status = adopt(context, m, mesh);
     end_mesh(m);
+    return status;
+}
+
+/* The components, unless the caller sees to them. */
+static ovoid_status finish(ovoid_context *context, ovoid_status status, ovoid_mesh **mesh) {
+    if (status == OVOID_OK)
+        status = ov_mesh_finish(context, *mesh);
+    if (status != OVOID_OK)
+        ovoid_mesh_destroy(mesh);
     return status;
 }
 
@@ -895,8 +1041,11 @@ ovoid_status ov_march(ovoid_context *context, const ov_body *bodies, size_t coun
 ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, const uint64_t limit[3],
                             const double origin[3], const ov_watch *watch, ovoid_mesh **mesh) {
-    return march(context, NULL, bodies, count, options,
-                 &(plan_of_mesh){.limit = limit, .origin = origin, .watch = watch}, mesh);
+    *mesh = NULL;
+    return finish(context,
+                  march(context, NULL, bodies, count, options,
+                        &(plan_of_mesh){.limit = limit, .origin = origin, .watch = watch}, mesh),
+                  mesh);
 }
 
 static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
@@ -927,6 +1076,17 @@ ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **result) {
     return OVOID_OK;
 }
 
+/* Beyond what the last mesh took: models end here and there a step outside the original. */
+#define WANTED_MORE 8
+
+void ov_marcher_stay(ov_marcher *m) {
+    static const uint64_t limit[3] = OV_MARCH_PIECE;
+    for (size_t axis = 0; axis < 3 && m->grid.total > 0; ++axis) {
+        m->wanted[axis] = m->grid.bricks[axis] * brick_points[axis] + WANTED_MORE;
+        m->wanted[axis] = m->wanted[axis] < limit[axis] ? m->wanted[axis] : limit[axis];
+    }
+}
+
 void ov_marcher_destroy(ov_marcher **kept) {
     if (!*kept)
         return;
@@ -937,9 +1097,9 @@ void ov_marcher_destroy(ov_marcher **kept) {
 
 ovoid_status ov_mesh_bodies_light(ovoid_context *context, ov_marcher *kept, const ov_body *bodies,
                                   size_t count, const ovoid_mesh_options *options,
-                                  const double origin[3], const ov_watch *watch,
+                                  const double origin[3], const ov_watch *watch, bool normals,
                                   ovoid_mesh **mesh) {
     const plan_of_mesh how = {
-        .limit = piece_limit, .origin = origin, .watch = watch, .specks = true};
+        .limit = piece_limit, .origin = origin, .watch = watch, .specks = true, .bare = !normals};
     return march(context, kept, bodies, count, options, &how, mesh);
 }

@@ -8,10 +8,11 @@
 #include "mesh/pieces.h"
 #include "ovoid/ovoid.h"
 
-/* Lattice points of a piece, per axis, at most: a million, 16 MB on the device. Multiples of the
- * bricks' sides. The kernels' names of edges hold no more. */
+/* Lattice points of a piece, per axis, at most: eight million, 75 MB on the device. Multiples of
+ * the bricks' sides, and at most 256, which is what the kernels' names of edges hold. Each piece
+ * takes some twenty launches and half a dozen round trips, so that few large ones cost less. */
 #define OV_MARCH_PIECE                                                                             \
-    { 128, 128, 64 }
+    { 256, 256, 128 }
 
 /* A vertex keeps this far from the ends of its edge, in lattice steps (see kernels/march.cl). */
 #define OV_EDGE_MARGIN 7.62939453125e-6
@@ -38,12 +39,18 @@ typedef struct ov_marcher ov_marcher;
 ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **marcher);
 void ov_marcher_destroy(ov_marcher **marcher);
 
-/* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). */
+/* The next meshes have pieces a little larger than the last one, where that is enough for them:
+ * then what depends on the size of pieces is not made anew each time. */
+void ov_marcher_stay(ov_marcher *marcher);
+
+/* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The light one knows its
+ * components only after ov_mesh_finish(), so that the device can have something to do meanwhile;
+ * normals: whether it is to have them. */
 ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
                             const ovoid_mesh_options *options, ovoid_mesh **mesh);
 ovoid_status ov_mesh_bodies_light(ovoid_context *context, ov_marcher *marcher,
                                   const ov_body *bodies, size_t count,
                                   const ovoid_mesh_options *options, const double origin[3],
-                                  const ov_watch *watch, ovoid_mesh **mesh);
+                                  const ov_watch *watch, bool normals, ovoid_mesh **mesh);
 
 #endif

@@ -256,39 +256,37 @@ static ovoid_status make_normals(ovoid_context *context, ovoid_mesh *mesh) {
     return OVOID_OK;
 }
 
-/* Takes `arrays` over. */
-static ovoid_status finish_mesh(ovoid_context *context, const ovoid_mesh *arrays,
-                                ovoid_mesh **mesh) {
+/* Takes `arrays` over; NULL where memory runs out. */
+static ovoid_mesh *take_arrays(ovoid_context *context, const ovoid_mesh *arrays) {
+    ovoid_mesh *const made = ov_alloc(context, 1, sizeof *made, "a mesh");
+    if (made) {
+        *made = *arrays;
+        return made;
+    }
+    free(arrays->xyz);
+    free(arrays->offsets);
+    free(arrays->normals);
+    free(arrays->corners);
+    return NULL;
+}
+
+ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
     ovoid_status status = OVOID_OK;
-    ovoid_mesh *made = ov_alloc(context, 1, sizeof *made, "a mesh");
-    if (!made) {
-        free(arrays->xyz);
-        free(arrays->offsets);
-        free(arrays->normals);
-        free(arrays->corners);
+    OV_TRY(check_arrays(context, mesh));
+    if (mesh->xyz && !mesh->normals)
+        OV_TRY(make_normals(context, mesh));
+    mesh->component_of =
+        ov_alloc(context, mesh->vertices, sizeof *mesh->component_of, "components of a mesh");
+    if (!mesh->component_of)
         return OVOID_ERROR_MEMORY;
-    }
-    *made = *arrays;
-    OV_TRY(check_arrays(context, made));
-    if (!made->normals)
-        OV_TRY(make_normals(context, made));
-    made->component_of =
-        ov_alloc(context, made->vertices, sizeof *made->component_of, "components of a mesh");
-    if (!made->component_of) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
     OV_TRY(ov_progress_ask(context));
-    OV_TRY(find_components(context, made));
+    OV_TRY(find_components(context, mesh));
     OV_TRY(ov_progress_ask(context));
-    if (made->xyz)
-        OV_TRY(check_edges(context, made));
+    if (mesh->xyz)
+        OV_TRY(check_edges(context, mesh));
     OV_TRY(ov_progress_ask(context));
-    OV_TRY(measure_components(context, made));
-    *mesh = made;
-    made = NULL;
+    OV_TRY(measure_components(context, mesh));
 cleanup:
-    ovoid_mesh_destroy(&made);
     return status;
 }
 
@@ -299,7 +297,15 @@ ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, 
                                .xyz = xyz,
                                .normals = normals,
                                .corners = corners};
-    return finish_mesh(context, &arrays, mesh);
+    ovoid_mesh *made = take_arrays(context, &arrays);
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    const ovoid_status status = ov_mesh_finish(context, made);
+    if (status == OVOID_OK)
+        *mesh = made;
+    else
+        ovoid_mesh_destroy(&made);
+    return status;
 }
 
 ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const double origin[3],
@@ -311,7 +317,11 @@ ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const d
                                .origin = {origin[0], origin[1], origin[2]},
                                .normals = normals,
                                .corners = corners};
-    return finish_mesh(context, &arrays, mesh);
+    ovoid_mesh *const made = take_arrays(context, &arrays);
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    *mesh = made;
+    return OVOID_OK;
 }
 
 static void *copy_of(ovoid_context *context, const void *data, size_t count, size_t size) {
@@ -360,6 +370,8 @@ void ovoid_mesh_destroy(ovoid_mesh **mesh) {
     free((*mesh)->corners);
     free((*mesh)->component_of);
     free((*mesh)->component);
+    for (size_t k = 0; k < sizeof(*mesh)->on_device / sizeof *(*mesh)->on_device; ++k)
+        ov_buffer_destroy(&(*mesh)->on_device[k]);
     free(*mesh);
     *mesh = NULL;
 }

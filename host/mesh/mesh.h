@@ -6,6 +6,7 @@
 
 #include "base/base.h"
 #include "base/progress.h"
+#include "field/field.h"
 #include "ovoid/ovoid.h"
 
 /* A light mesh, which the library keeps for itself, has offsets instead of xyz, knows nothing of
@@ -20,13 +21,16 @@ struct ovoid_mesh {
     uint32_t *component_of; /* vertices */
     ovoid_component *component;
     size_t components;
-    double spacing;   /* of the lattice on whose edges the vertices lie, angstrom; 0 if not known */
-    uint8_t *edge;    /* vertices, the edge of each: its axis, and shifted by OV_EDGE_AXIS_BITS how
-                         often the lattice was halved there; NULL if light, or not known */
-    size_t missed;    /* terms whose piece of the surface could not be meshed (specks.h) */
+    double spacing; /* of the lattice on whose edges the vertices lie, angstrom; 0 if not known */
+    uint8_t *edge;  /* vertices, the edge of each: its axis, and shifted by OV_EDGE_AXIS_BITS how
+                       often the lattice was halved there; NULL if light, or not known */
+    size_t missed;  /* terms whose piece of the surface could not be meshed (specks.h) */
+    ov_buffer on_device[2]; /* of a light mesh, offsets and corners once more, or none */
     bool along_curve; /* vertices and triangles follow a space-filling curve, none is without the
                          other */
 };
+
+enum { OV_ON_DEVICE_OFFSETS, OV_ON_DEVICE_CORNERS };
 
 #define OV_EDGE_AXIS_BITS 2
 #define OV_EDGE_AXES 3u /* mask */
@@ -57,10 +61,12 @@ static inline void ov_mesh_centre(const ovoid_mesh *mesh, size_t triangle, doubl
 ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
                            uint32_t *corners, size_t triangles, ovoid_mesh **mesh);
 
-/* A light mesh: offsets from origin, and normals. */
+/* A light mesh: offsets from origin, and normals or NULL for none. Its components are found by
+ * ov_mesh_finish(), which is to follow. */
 ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const double origin[3],
                                  float *normals, size_t vertices, uint32_t *corners,
                                  size_t triangles, ovoid_mesh **mesh);
+ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh);
 
 /* Component of a triangle. */
 static inline const ovoid_component *ov_mesh_component_of_triangle(const ovoid_mesh *mesh,

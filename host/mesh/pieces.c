@@ -42,6 +42,11 @@ double ov_body_reach(const ov_body *body, double value) {
     return q > 0.0 ? sqrt(q) : -1.0;
 }
 
+/* (distance / half-side)^2 from which on a term is not looked at, and more than the share of the
+ * isovalue that all of them come to: amplitudes are below 2^127. */
+#define FAR 150.0
+#define FAR_SUM 1e-6
+
 /* What a lattice index may be; differences and doubles stay exact far beyond. */
 #define INDEX_LIMIT 1e12
 
@@ -50,6 +55,7 @@ static const uint64_t brick[3] = {OV_BRICK_X, OV_BRICK_Y, OV_BRICK_Z};
 typedef struct planner {
     const ov_body *bodies;
     size_t count;
+    double isovalue;
     double cutoff, threshold; /* values that count as reaching a piece, and as making it one */
     ov_pieces *pieces;
     uint64_t *keys;  /* of all pairs of a piece and a term that reaches it */
@@ -64,6 +70,51 @@ static ovoid_status fail_large(ovoid_context *context, double spacing) {
                    "the lattice about the surface is too large for a spacing of %g angstrom; use a "
                    "larger one",
                    spacing);
+}
+
+/* The most that phi can be where coordinate `axis` is x: each term is largest where its axis
+ * through the centre meets that plane. */
+static double most_at(const planner *p, int axis, double x) {
+    double sum = 0.0;
+    for (size_t i = 0; i < p->count; ++i) {
+        const ov_body *const body = &p->bodies[i];
+        const double off = (x - body->quadric.centre[axis]) / body->extent[axis];
+        if (off * off < FAR)
+            sum += body->quadric.amplitude * exp(-off * off);
+    }
+    return sum + FAR_SUM * p->isovalue;
+}
+
+/* The lattice index between `out`, beyond which there is no surface, and `in`, up to which terms
+ * only grow, where phi may first come up to the isovalue. */
+static double first_near(const planner *p, int axis, double out, double in) {
+    while (fabs(in - out) > 1.0) {
+        const double middle = floor(0.5 * (out + in));
+        if (most_at(p, axis, middle * p->pieces->spacing) < p->isovalue)
+            out = middle;
+        else
+            in = middle;
+    }
+    return out;
+}
+
+/* Makes the box of everything that reaches the threshold smaller, where all of it together is too
+ * little: long faint terms reach far, and few of them. */
+static void tighten(const planner *p, double low[3], double high[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        double first = INFINITY, last = -INFINITY;
+        if (!(low[axis] > -INDEX_LIMIT && high[axis] < INDEX_LIMIT))
+            continue;
+        for (size_t i = 0; i < p->count; ++i) {
+            const double centre = p->bodies[i].quadric.centre[axis] / p->pieces->spacing;
+            first = fmin(first, centre);
+            last = fmax(last, centre);
+        }
+        if (first > low[axis])
+            low[axis] = first_near(p, axis, low[axis], floor(first));
+        if (last < high[axis])
+            high[axis] = first_near(p, axis, high[axis], ceil(last));
+    }
 }
 
 /* The box of everything that reaches the threshold, as lattice indices. False if nothing does. */
@@ -86,12 +137,17 @@ static bool bounds(const planner *p, double low[3], double high[3]) {
     return any;
 }
 
+/* A piece grows by this factor at most, along an axis, to be as large as is wanted. */
+#define WANTED_MOST 1.25
+
 /* Cuts the box, grown by one point for the cells below it, into equal pieces of whole bricks. */
-static ovoid_status plan(ovoid_context *context, const planner *p, const uint64_t limit[3]) {
+static ovoid_status plan(ovoid_context *context, const planner *p, const uint64_t limit[3],
+                         const uint64_t wanted[3]) {
     ov_pieces *const pieces = p->pieces;
     double low[3] = {0}, high[3] = {0}, total = 1.0;
     if (!bounds(p, low, high))
         return OVOID_OK;
+    tighten(p, low, high);
     for (int axis = 0; axis < 3; ++axis) {
         if (!(low[axis] > -INDEX_LIMIT && high[axis] < INDEX_LIMIT))
             return fail_large(context, pieces->spacing);
@@ -99,6 +155,9 @@ static ovoid_status plan(ovoid_context *context, const planner *p, const uint64_
         const uint64_t count = (size + limit[axis] - 1) / limit[axis];
         pieces->origin[axis] = (int64_t)low[axis] - 1;
         pieces->size[axis] = (size + count * brick[axis] - 1) / (count * brick[axis]) * brick[axis];
+        if (wanted && wanted[axis] >= pieces->size[axis] && wanted[axis] <= limit[axis] &&
+            (double)wanted[axis] <= WANTED_MOST * (double)pieces->size[axis])
+            pieces->size[axis] = wanted[axis];
         pieces->count[axis] = (size + pieces->size[axis] - 1) / pieces->size[axis];
         total *= (double)pieces->count[axis];
     }
@@ -261,15 +320,17 @@ static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
 
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,
                               double isovalue, double cutoff, double spacing,
-                              const uint64_t limit[3], ov_pieces *pieces) {
+                              const uint64_t limit[3], const uint64_t wanted[3],
+                              ov_pieces *pieces) {
     ovoid_status status = OVOID_OK;
     ov_pieces made = {.spacing = spacing};
     planner p = {.bodies = bodies,
                  .count = count,
+                 .isovalue = isovalue,
                  .cutoff = cutoff,
                  .threshold = fmax(isovalue / (double)count, cutoff),
                  .pieces = &made};
-    OV_TRY(plan(context, &p, limit));
+    OV_TRY(plan(context, &p, limit, wanted));
     if (made.count[0] > 0)
         OV_TRY(sort_pairs(context, &p));
 cleanup:

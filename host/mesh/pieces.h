@@ -37,13 +37,14 @@ typedef struct ov_pieces {
 } ov_pieces;
 
 /* The pieces with all cells and lattice edges that phi = isovalue may cross, each as large as limit
- * (lattice points per axis) or smaller. Where no term reaches isovalue / count, phi < isovalue; so
- * a piece in which none does, one lattice step about it included, is left out. A piece has the
- * terms that reach cutoff in it, the lattice step included. OVOID_ERROR_LIMIT when the lattice is
- * too large. No pieces at all are not an error here. */
+ * (lattice points per axis) or smaller, but where that is little more as large as `wanted`, whole
+ * bricks within the limit; NULL: nothing is. Where no term reaches isovalue / count, phi <
+ * isovalue; so a piece in which none does, one lattice step about it included, is left out. A piece
+ * has the terms that reach cutoff in it, the lattice step included. OVOID_ERROR_LIMIT when the
+ * lattice is too large. No pieces at all are not an error here. */
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,
                               double isovalue, double cutoff, double spacing,
-                              const uint64_t limit[3], ov_pieces *pieces);
+                              const uint64_t limit[3], const uint64_t wanted[3], ov_pieces *pieces);
 void ov_pieces_destroy(ov_pieces *pieces);
 
 /* Position of the first of ascending keys that is this one or higher; count where there is none. */

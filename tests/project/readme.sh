@@ -1,12 +1,13 @@
 #!/bin/sh
 # readme.sh OVOID
 # What README.md says is so: CI runs its test line, its example is the program that is tested, its
-# workflows exist, and it names every option of the tool with its default.
+# workflows exist; and docs/reference.md names every option of the tool with its default.
 set -u
 ovoid=$1
+reference=docs/reference.md
 status=0
 fail() {
-    echo "README.md: $*"
+    echo "README.md or docs/reference.md: $*"
     status=1
 }
 # The fenced block under a marker.
@@ -35,7 +36,7 @@ done
     grep -o -- '--[a-z][a-z0-9-]*' | sort -u >"$work/options"
 [ -s "$work/options" ] || fail "the tool's help names no option"
 while read -r option; do
-    grep -q -- "$option\\>" README.md || fail "$option is missing"
+    grep -q -- "$option\\>" "$reference" || fail "$option is missing"
 done <"$work/options"
 
 # "--name X   words (default V unit)", over one or more lines, against "| `--name X` | V |".
@@ -43,6 +44,6 @@ done <"$work/options"
     sed -n 's/^\(--[a-z0-9-]* [A-Z]*\) .*(default \([0-9][^ )]*\).*/\1=\2/p' >"$work/defaults"
 [ -s "$work/defaults" ] || fail "the tool's help gives no default"
 while IFS='=' read -r option default; do
-    grep -qF -- "\`$option\` | $default |" README.md || fail "the default of $option is $default"
+    grep -qF -- "\`$option\` | $default |" "$reference" || fail "the default of $option is $default"
 done <"$work/defaults"
 exit "$status"

@@ -19,8 +19,6 @@ static ovoid_status prepare(ovoid_context *context, ov_solver *s, size_t count) 
     OV_TRY(ov_device_get(context, &device));
     s->group = device->solve_group;
     s->wide = device->shape.lanes == 1 ? s->group : OV_SOLVE_WIDE;
-    if (s->looks == OV_LOOKS_OF_DEVICE)
-        s->looks = device->shape.lanes == 1 ? OV_LOOKS_WAIT : OV_LOOKS_LAG;
     groups = groups_of(s, count);
     if (!s->start.handle) {
         OV_TRY(ov_kernel_create(context, "solve", "solve_product", &s->product));
@@ -33,6 +31,9 @@ static ovoid_status prepare(ovoid_context *context, ov_solver *s, size_t count) 
         OV_TRY(ov_buffer_reserve(context, vectors[k], vector, "vectors of the solver"));
     for (size_t k = 0; k < sizeof sums / sizeof *sums; ++k)
         OV_TRY(ov_buffer_reserve(context, sums[k], groups * sizeof(cl_float), "sums"));
+    OV_TRY(ov_buffer_reserve(context, &s->limit, sizeof(cl_float), "limits"));
+    OV_TRY(ov_buffer_reserve(context, &s->state, 2 * sizeof(cl_uint), "states"));
+    OV_TRY(ov_buffer_reserve(context, &s->state_next, 2 * sizeof(cl_uint), "states"));
     OV_TRY(ov_buffer_reserve(context, &s->factor, count * OV_SOLVE_FACTOR * sizeof(cl_float),
                              "factors"));
     OV_TRY(
@@ -53,54 +54,6 @@ static ovoid_status upload_factors(ovoid_context *context, ov_solver *s, const d
                            OV_SOLVE_FACTOR * count * sizeof *s->host);
 }
 
-/* ---- looks at the residual ------------------------------------------------------------------ */
-
-/* The residual is looked at after each fourth iteration. CPUs wait for it, which takes less than an
- * iteration. To others it is a round trip: it is read while the next iteration runs, which then
- * leaves x alone if it was not to be done any more. */
-#define LOOK_EVERY 4
-
-typedef struct look {
-    ov_later later;
-    float *partial; /* room for the sums of all groups */
-    size_t groups;
-} look;
-
-static ovoid_status begin_look(ovoid_context *context, const ov_buffer *sums, size_t groups,
-                               look *l) {
-    l->groups = groups;
-    return ov_buffer_read_later(context, sums, 0, l->partial, groups * sizeof *l->partial,
-                                &l->later);
-}
-
-static double sum_of(const look *l) {
-    double sum = 0.0;
-    for (size_t k = 0; k < l->groups; ++k)
-        sum += l->partial[k];
-    return sum;
-}
-
-/* The sum stays where no look was begun. */
-static ovoid_status end_look(ovoid_context *context, look *l, double *sum) {
-    if (!l->later.event)
-        return OVOID_OK;
-    const ovoid_status status = ov_later_end(context, &l->later);
-    if (status == OVOID_OK)
-        *sum = sum_of(l);
-    return status;
-}
-
-/* Waits for the sum. */
-static ovoid_status look_now(ovoid_context *context, const ov_buffer *sums, size_t groups, look *l,
-                             double *sum) {
-    l->groups = groups;
-    const ovoid_status status =
-        ov_buffer_read(context, sums, 0, l->partial, groups * sizeof *l->partial);
-    if (status == OVOID_OK)
-        *sum = sum_of(l);
-    return status;
-}
-
 /* ---- iterations ------------------------------------------------------------------------------ */
 
 /* What an iteration works on. */
@@ -111,7 +64,7 @@ typedef struct work {
     const ov_system *system;
     cl_float lambda;
     cl_uint count, groups; /* ellipsoids; partial sums in s->rz */
-    cl_float least;        /* residual to be reached, for iterations that may be too many; or 0 */
+    cl_float share;        /* of the residual, squared, that is to be left */
 } work;
 
 /* The moments of J^T W J p. */
@@ -119,11 +72,13 @@ static ovoid_status multiply(const work *w) {
     ovoid_status status = OVOID_OK;
     ov_solver *const s = w->s;
     const ov_system *const system = w->system;
+    w->operations->idle = &s->state;
     OV_TRY(ov_field_polynomial(w->context, w->operations, system->points, system->terms,
                                system->lists, &s->polynomial, system->weight, &s->jacobian_p));
     OV_TRY(ov_moments(w->context, w->operations, system->points, system->terms, system->lists,
                       &s->jacobian_p, &s->moments));
 cleanup:
+    w->operations->idle = NULL;
     return status;
 }
 
@@ -132,12 +87,13 @@ static ovoid_status step_alone(work *w) {
     ov_solver *const s = w->s;
     const cl_uint groups = w->groups;
     w->groups = 1;
-    return OV_LAUNCH(w->context, &s->step, s->wide, s->wide, OV_ARG(w->count), OV_ARG(w->lambda),
-                     OV_ARG(groups), OV_ARG(w->least), OV_ARG(s->factor.memory),
-                     OV_ARG(s->moments.memory), OV_ARG(s->diagonal.memory), OV_ARG(s->block.memory),
-                     OV_ARG(s->rz.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory),
-                     OV_ARG(s->x.memory), OV_ARG(s->r.memory), OV_ARG(s->z.memory),
-                     OV_ARG(s->polynomial.memory), OV_ARG(s->rz_next.memory));
+    return OV_LAUNCH(
+        w->context, &s->step, s->wide, s->wide, OV_ARG(w->count), OV_ARG(w->lambda), OV_ARG(groups),
+        OV_ARG(w->share), OV_ARG(s->state.memory), OV_ARG(s->factor.memory),
+        OV_ARG(s->moments.memory), OV_ARG(s->diagonal.memory), OV_ARG(s->block.memory),
+        OV_ARG(s->rz.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory), OV_ARG(s->x.memory),
+        OV_ARG(s->r.memory), OV_ARG(s->z.memory), OV_ARG(s->polynomial.memory),
+        OV_ARG(s->rz_next.memory), OV_ARG(s->limit.memory), OV_ARG(s->state_next.memory));
 }
 
 /* The same by many. */
@@ -146,20 +102,27 @@ static ovoid_status step_together(const work *w) {
     ovoid_context *const context = w->context;
     ov_solver *const s = w->s;
     OV_TRY(OV_LAUNCH(context, &s->product, w->count, s->group, OV_ARG(w->count), OV_ARG(w->lambda),
-                     OV_ARG(s->factor.memory), OV_ARG(s->moments.memory),
+                     OV_ARG(s->state.memory), OV_ARG(s->factor.memory), OV_ARG(s->moments.memory),
                      OV_ARG(s->diagonal.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory),
                      OV_ARG(s->pq.memory)));
     OV_TRY(OV_LAUNCH(context, &s->update, w->count, s->group, OV_ARG(w->count), OV_ARG(w->groups),
-                     OV_ARG(w->least), OV_ARG(s->block.memory), OV_ARG(s->rz.memory),
+                     OV_ARG(s->state.memory), OV_ARG(s->block.memory), OV_ARG(s->rz.memory),
                      OV_ARG(s->pq.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory),
                      OV_ARG(s->x.memory), OV_ARG(s->r.memory), OV_ARG(s->z.memory),
                      OV_ARG(s->rz_next.memory)));
     OV_TRY(OV_LAUNCH(context, &s->direction, w->count, s->group, OV_ARG(w->count),
-                     OV_ARG(w->groups), OV_ARG(s->factor.memory), OV_ARG(s->rz.memory),
-                     OV_ARG(s->rz_next.memory), OV_ARG(s->z.memory), OV_ARG(s->p.memory),
-                     OV_ARG(s->polynomial.memory)));
+                     OV_ARG(w->groups), OV_ARG(w->share), OV_ARG(s->state.memory),
+                     OV_ARG(s->factor.memory), OV_ARG(s->rz.memory), OV_ARG(s->rz_next.memory),
+                     OV_ARG(s->z.memory), OV_ARG(s->p.memory), OV_ARG(s->polynomial.memory),
+                     OV_ARG(s->limit.memory), OV_ARG(s->state_next.memory)));
 cleanup:
     return status;
+}
+
+static void swap_buffers(ov_buffer *a, ov_buffer *b) {
+    const ov_buffer swap = *a;
+    *a = *b;
+    *b = swap;
 }
 
 static ovoid_status iteration(work *w) {
@@ -167,47 +130,46 @@ static ovoid_status iteration(work *w) {
     ov_solver *const s = w->s;
     OV_TRY(multiply(w));
     OV_TRY(w->count <= OV_SOLVE_ALONE && !s->apart ? step_alone(w) : step_together(w));
-    const ov_buffer swap = s->rz;
-    s->rz = s->rz_next;
-    s->rz_next = swap;
+    swap_buffers(&s->rz, &s->rz_next);
+    swap_buffers(&s->state, &s->state_next);
 cleanup:
     return status;
 }
 
-/* What looks are under way write to s->host: they end before others do. */
-static ovoid_status end_both(ovoid_context *context, look *first, look *later,
-                             ovoid_status status) {
-    const ovoid_status one = ov_later_end(context, &first->later);
-    const ovoid_status other = ov_later_end(context, &later->later);
-    return status != OVOID_OK ? status : one != OVOID_OK ? one : other;
-}
-
-/* *still: there is nothing to solve, and x is no solution. */
-static ovoid_status iterate(work *w, uint32_t iterations, double tolerance, bool *still) {
+/* The step so far with the state, in one round trip. */
+static ovoid_status read_step(work *w, cl_uint state[2]) {
     ovoid_status status = OVOID_OK;
     ov_solver *const s = w->s;
-    double start = 0.0, now = INFINITY;
-    cl_float least = 0.0f;
-    look first = {.partial = s->host}, later = {.partial = s->host + groups_of(s, w->count)};
-    *still = false;
-    if (iterations > 0)
-        OV_TRY(begin_look(w->context, &s->rz, w->groups, &first));
-    for (uint32_t k = 1; k <= iterations && now > (double)least; ++k) {
-        w->least = later.later.event ? least : 0.0f;
-        OV_TRY(iteration(w));
-        OV_TRY(end_look(w->context, &first, &start));
-        least = (cl_float)(tolerance * tolerance * start);
-        *still = !(start > 0.0);
-        OV_TRY(end_look(w->context, &later, &now));
-        if (*still || !(now > (double)least))
+    const size_t size = w->count * (size_t)OV_FACTOR_PARAMETERS;
+    ov_later later = {0};
+    OV_TRY(ov_buffer_read_later(w->context, &s->state, 0, state, 2 * sizeof *state, &later));
+    OV_TRY(ov_buffer_read(w->context, &s->x, 0, s->host, size * sizeof *s->host));
+cleanup:;
+    const ovoid_status other = ov_later_end(w->context, &later);
+    return status != OVOID_OK ? status : other;
+}
+
+/* Iterations are started without waiting: at first as many as the last solution took, as those
+ * of the steps of one fit are much alike, and where that was not enough a few more at a time. One
+ * too many costs three launches of kernels that return at once. */
+#define MORE 2
+
+static ovoid_status iterate(work *w, uint32_t iterations) {
+    ovoid_status status = OVOID_OK;
+    ov_solver *const s = w->s;
+    cl_uint state[2] = {0, 0};
+    uint32_t next = s->last > 0 ? s->last : 2 * MORE;
+    for (uint32_t begun = 0; begun == 0 || (begun < iterations && state[0] == 0); next = MORE) {
+        for (; next > 0 && begun < iterations; --next, ++begun)
+            OV_TRY(iteration(w));
+        OV_TRY(read_step(w, state));
+        if (iterations == 0)
             break;
-        ++s->iterations;
-        if (k % LOOK_EVERY == 0 && k < iterations)
-            OV_TRY(s->looks == OV_LOOKS_WAIT ? look_now(w->context, &s->rz, w->groups, &later, &now)
-                                             : begin_look(w->context, &s->rz, w->groups, &later));
     }
+    s->last = state[1];
+    s->iterations += state[1];
 cleanup:
-    return end_both(w->context, &first, &later, status);
+    return status;
 }
 
 ovoid_status ov_solve(ovoid_context *context, ov_solver *s, ov_operations *operations,
@@ -217,20 +179,23 @@ ovoid_status ov_solve(ovoid_context *context, ov_solver *s, ov_operations *opera
     const cl_uint count = (cl_uint)system->terms->count;
     const cl_float damping = (cl_float)lambda;
     const size_t size = count * (size_t)OV_FACTOR_PARAMETERS;
-    bool still;
     OV_TRY(prepare(context, s, count));
-    work w = {context, s, operations, system, damping, count, (cl_uint)groups_of(s, count), 0.0f};
+    work w = {context,
+              s,
+              operations,
+              system,
+              damping,
+              count,
+              (cl_uint)groups_of(s, count),
+              (cl_float)(tolerance * tolerance)};
     OV_TRY(upload_factors(context, s, system->parameters, count));
     OV_TRY(OV_LAUNCH(context, &s->start, count, s->group, OV_ARG(count), OV_ARG(damping),
                      OV_ARG(s->factor.memory), OV_ARG(system->gram->memory),
                      OV_ARG(system->moments->memory), OV_ARG(s->block.memory),
                      OV_ARG(s->diagonal.memory), OV_ARG(s->x.memory), OV_ARG(s->r.memory),
-                     OV_ARG(s->p.memory), OV_ARG(s->polynomial.memory), OV_ARG(s->rz.memory)));
-    OV_TRY(iterate(&w, iterations, tolerance, &still));
-    memset(step, 0, size * sizeof *step);
-    if (still)
-        goto cleanup;
-    OV_TRY(ov_buffer_read(context, &s->x, 0, s->host, size * sizeof *s->host));
+                     OV_ARG(s->p.memory), OV_ARG(s->polynomial.memory), OV_ARG(s->rz.memory),
+                     OV_ARG(s->state.memory)));
+    OV_TRY(iterate(&w, iterations));
     for (size_t j = 0; j < size; ++j)
         step[j] = s->host[j];
 cleanup:
@@ -239,9 +204,10 @@ cleanup:
 
 void ov_solver_destroy(ov_solver *s) {
     ov_kernel *const kernels[] = {&s->start, &s->product, &s->update, &s->direction, &s->step};
-    ov_buffer *const buffers[] = {&s->factor,  &s->block, &s->diagonal,   &s->x,          &s->r,
-                                  &s->z,       &s->p,     &s->q,          &s->polynomial, &s->rz,
-                                  &s->rz_next, &s->pq,    &s->jacobian_p, &s->moments};
+    ov_buffer *const buffers[] = {
+        &s->factor,     &s->block,   &s->diagonal,   &s->x,     &s->r,         &s->z,
+        &s->p,          &s->q,       &s->polynomial, &s->rz,    &s->rz_next,   &s->pq,
+        &s->jacobian_p, &s->moments, &s->limit,      &s->state, &s->state_next};
     for (size_t k = 0; k < sizeof kernels / sizeof *kernels; ++k)
         ov_kernel_destroy(kernels[k]);
     for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)

@@ -1,7 +1,7 @@
 /*
  * One Levenberg-Marquardt step on the device: conjugate gradients on the damped normal equations,
- * matrix free (kernels/solve.cl). The host starts kernels and looks at the residual now and then;
- * vectors stay on the device until the step is read.
+ * matrix free (kernels/solve.cl). The host starts as many iterations as it may take, and the device
+ * stops them; vectors stay there until the step is read.
  */
 #ifndef OV_SOLVER_H
 #define OV_SOLVER_H
@@ -9,19 +9,17 @@
 #include "field/field.h"
 #include "model/factor.h"
 
-/* Looks at the residual: waited for, or an iteration late. The device decides unless tests do. */
-typedef enum ov_looks { OV_LOOKS_OF_DEVICE, OV_LOOKS_WAIT, OV_LOOKS_LAG } ov_looks;
-
 typedef struct ov_solver {
     ov_kernel start, product, update, direction, step;
     ov_buffer factor, block, diagonal, x, r, z, p, q, polynomial, rz, rz_next, pq;
-    ov_buffer jacobian_p; /* weight * (J p) at the points */
-    ov_buffer moments;    /* of it */
-    float *host;          /* factors as uploaded, steps and sums as read back */
+    ov_buffer limit, state, state_next; /* see kernels/solve.cl */
+    ov_buffer jacobian_p;               /* weight * (J p) at the points */
+    ov_buffer moments;                  /* of it */
+    float *host;                        /* factors as uploaded, steps and sums as read back */
     size_t host_capacity;
-    size_t group; /* ellipsoids in a work-group of many, */
-    size_t wide;  /* and work-items in the only one */
-    ov_looks looks;
+    size_t group;        /* ellipsoids in a work-group of many, */
+    size_t wide;         /* and work-items in the only one */
+    uint32_t last;       /* iterations that the last solution took; 0: not known */
     bool apart;          /* set by tests: as if there were many */
     uint64_t iterations; /* of conjugate gradients, all solves together */
 } ov_solver;

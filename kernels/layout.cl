@@ -7,7 +7,7 @@
  * refuse to fold. */
 #define OFFSET(object, member) (uint)((const char *)&(object).member - (const char *)&(object))
 
-/* out: sizes and offsets in the order of tests/test_device.c; one work-item. */
+/* out: sizes and offsets in the order of ov_layout_of_host(); one work-item. */
 kernel void layout(global uint *out) {
     ov_term term;
     ov_tree tree;

@@ -22,6 +22,7 @@ struct _cl_device_id {
     cl_device_type type;
     cl_bool available;
     cl_bool compiler;
+    const char *extensions; /* NULL: none */
 };
 
 static cl_int give(const void *from, size_t bytes, size_t room, void *to, size_t *needed) {
@@ -53,6 +54,33 @@ static cl_int CL_API_CALL platform_info(cl_platform_id platform, cl_platform_inf
     }
 }
 
+/* What the extensions tell, of each device that lists them: PCI addresses and a UUID. */
+#ifndef CL_DEVICE_UUID_KHR
+#define CL_DEVICE_UUID_KHR 0x106A
+#endif
+#ifndef CL_DEVICE_PCI_BUS_INFO_KHR
+#define CL_DEVICE_PCI_BUS_INFO_KHR 0x410F
+#endif
+#define PCI_BUS_ID_NV 0x4008
+#define PCI_SLOT_ID_NV 0x4009
+static cl_int identity_info(cl_device_info what, size_t room, void *to, size_t *needed) {
+    static const unsigned char uuid[16] = {0x01, 0x23, 0x45, 0x67, 0x89, 0xab, 0xcd, 0xef,
+                                           0x01, 0x23, 0x45, 0x67, 0x89, 0xab, 0xcd, 0xef};
+    static const cl_uint address[4] = {1, 0x3b, 0, 2}, bus = 0xaf, slot = 1 << 3;
+    switch (what) {
+    case CL_DEVICE_UUID_KHR:
+        return give(uuid, sizeof uuid, room, to, needed);
+    case CL_DEVICE_PCI_BUS_INFO_KHR:
+        return give(address, sizeof address, room, to, needed);
+    case PCI_BUS_ID_NV:
+        return give(&bus, sizeof bus, room, to, needed);
+    case PCI_SLOT_ID_NV:
+        return give(&slot, sizeof slot, room, to, needed);
+    default:
+        return CL_INVALID_VALUE;
+    }
+}
+
 static cl_int CL_API_CALL device_info(cl_device_id device, cl_device_info what, size_t room,
                                       void *to, size_t *needed) {
     const cl_ulong memory = 1 << 20;
@@ -77,6 +105,13 @@ static cl_int CL_API_CALL device_info(cl_device_id device, cl_device_info what, 
         return give(&memory, sizeof memory, room, to, needed);
     case CL_DEVICE_MAX_WORK_GROUP_SIZE:
         return give(&group, sizeof group, room, to, needed);
+    case CL_DEVICE_EXTENSIONS:
+        return give_text(device->extensions ? device->extensions : "", room, to, needed);
+    case CL_DEVICE_UUID_KHR:
+    case CL_DEVICE_PCI_BUS_INFO_KHR:
+    case PCI_BUS_ID_NV:
+    case PCI_SLOT_ID_NV:
+        return identity_info(what, room, to, needed);
     default:
         return give(&zero, sizeof zero, room, to, needed);
     }
@@ -105,13 +140,14 @@ static const cl_icd_dispatch dispatch = {
 static struct _cl_platform_id fake_platform = {&dispatch};
 
 static struct _cl_device_id fake_devices[] = {
-    {&dispatch, "Fake Mute", "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_FALSE},
-    {&dispatch, "Fake Away", "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_FALSE, CL_TRUE},
-    {&dispatch, "Fake Old", "OpenCL 1.1", CL_DEVICE_TYPE_ACCELERATOR, CL_TRUE, CL_TRUE},
-    {&dispatch, NULL, "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_TRUE},
+    {&dispatch, "Fake Mute", "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_FALSE, NULL},
+    {&dispatch, "Fake Away", "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_FALSE, CL_TRUE, NULL},
+    {&dispatch, "Fake Old", "OpenCL 1.1", CL_DEVICE_TYPE_ACCELERATOR, CL_TRUE, CL_TRUE, NULL},
+    {&dispatch, NULL, "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_TRUE, NULL},
     {&dispatch, "  Fake\t Full  4090 ", "OpenCL 3.0 x", CL_DEVICE_TYPE_ACCELERATOR, CL_TRUE,
-     CL_TRUE},
-    {&dispatch, "Fake Screen", "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_TRUE},
+     CL_TRUE, "cl_khr_device_uuid_not cl_khr_pci_bus_info cl_khr_device_uuid"},
+    {&dispatch, "Fake Screen", "OpenCL 1.2", CL_DEVICE_TYPE_GPU, CL_TRUE, CL_TRUE,
+     "cl_khr_icd cl_nv_device_attribute_query"},
 };
 
 static cl_int CL_API_CALL device_ids(cl_platform_id platform, cl_device_type type, cl_uint room,

@@ -34,7 +34,7 @@ static float *choose_points(scene *s, double spacing, double reach, size_t *kept
                 double y[3];
                 for (int k = 0; k < 3; ++k)
                     y[k] = (float)((double)at[k] * spacing);
-                if (!wanted(s, at, reference_field(s->quadrics, s->count, y).value))
+                if (!wanted(s, at, ov_twin_field(s->quadrics, s->count, y).value))
                     continue;
                 for (int k = 0; k < 3; ++k)
                     points[3 * *kept + (size_t)k] = (float)y[k];

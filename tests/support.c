@@ -70,19 +70,6 @@ void *test_alloc(size_t count, size_t size) {
     return memory;
 }
 
-/* ---- random numbers ----------------------------------------------------------------------- */
-
-uint64_t random_bits(test_random *random) {
-    uint64_t z = random->state += 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
-double random_uniform(test_random *random, double low, double high) {
-    return low + (high - low) * ldexp((double)(random_bits(random) >> 11), -53);
-}
-
 /* ---- models ------------------------------------------------------------------------------- */
 
 #define PI 3.14159265358979323846
@@ -229,8 +216,8 @@ void write_floats(ovoid_context *context, ov_buffer *buffer, const float *values
 
 /* ---- comparison --------------------------------------------------------------------------- */
 
-void expect_close(double got, reference_sum wanted, double tolerance, double *worst,
-                  const char *what, size_t index) {
+void expect_close(double got, ov_twin_sum wanted, double tolerance, double *worst, const char *what,
+                  size_t index) {
     const double unit = FLT_EPSILON * wanted.scale;
     const double error = fabs(got - wanted.value);
     if (!(error <= tolerance * unit + 1e-30))

@@ -7,7 +7,8 @@
 
 #include "field/field.h"
 #include "once.h"
-#include "reference/reference.h"
+#include "selftest/check.h"
+#include "selftest/twin.h"
 
 #include <float.h>
 #include <math.h>
@@ -54,12 +55,10 @@ void *test_alloc(size_t count, size_t size);
 
 /* ---- random numbers (splitmix64) ---------------------------------------------------------- */
 
-typedef struct test_random {
-    uint64_t state;
-} test_random;
+typedef ov_random test_random;
 
-uint64_t random_bits(test_random *random);
-double random_uniform(test_random *random, double low, double high);
+#define random_bits ov_random_bits
+#define random_uniform ov_random_uniform
 
 /* ---- models ------------------------------------------------------------------------------- */
 
@@ -132,8 +131,8 @@ void write_floats(ovoid_context *context, ov_buffer *buffer, const float *values
 
 /* Fails unless |got - wanted.value| <= tolerance * FLT_EPSILON * wanted.scale (+ 1e-30, for what
  * lies below the smallest float that every device keeps). Keeps the largest quotient in *worst. */
-void expect_close(double got, reference_sum wanted, double tolerance, double *worst,
-                  const char *what, size_t index);
+void expect_close(double got, ov_twin_sum wanted, double tolerance, double *worst, const char *what,
+                  size_t index);
 
 /* Fails unless each atom of the molecule has an owner among the model's ellipsoids, and of the
  * share `most` of the atoms the owner has one of the `among` largest values at the atom's centre.

@@ -25,6 +25,15 @@ static void versions(void **state) {
     assert_int_equal(ovoid_abi(), OVOID_ABI);
 }
 
+static void sizes_of_structures(void **state) {
+    (void)state;
+    assert_int_equal(ovoid_sizeof("ovoid_fit_options"), sizeof(ovoid_fit_options));
+    assert_int_equal(ovoid_sizeof("ovoid_ellipsoid"), sizeof(ovoid_ellipsoid));
+    assert_int_equal(ovoid_sizeof("ovoid_picture_options"), sizeof(ovoid_picture_options));
+    assert_int_equal(ovoid_sizeof("ovoid_context"), 0); /* opaque */
+    assert_int_equal(ovoid_sizeof(""), 0);
+}
+
 /* ---- structures that the caller fills in ---------------------------------------------------- */
 
 /* Each *_init() fills as much as there is room for, zeros beyond, and nothing behind. */
@@ -56,7 +65,10 @@ static void structures_begin_with_their_size(void **state) {
     EXPECT_INIT(ovoid_measure_options, ovoid_measure_options_init);
     EXPECT_INIT(ovoid_measures, ovoid_measures_init);
     EXPECT_INIT(ovoid_export_options, ovoid_export_options_init);
+    EXPECT_INIT(ovoid_scene, ovoid_scene_init);
     EXPECT_INIT(ovoid_picture_options, ovoid_picture_options_init);
+    EXPECT_INIT(ovoid_selftest_options, ovoid_selftest_options_init);
+    EXPECT_INIT(ovoid_selftest_result, ovoid_selftest_result_init);
 }
 
 /* A program of a later version: its structure is longer. */
@@ -287,6 +299,7 @@ static void callbacks_may_use_other_contexts_alone(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(versions),
+        cmocka_unit_test(sizes_of_structures),
         cmocka_unit_test(structures_begin_with_their_size),
         cmocka_unit_test(later_structures_are_taken_where_they_ask_for_nothing_new),
         cmocka_unit_test(earlier_structures_get_defaults),

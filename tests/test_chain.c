@@ -39,11 +39,11 @@ static void chained(const problem *p, double gradient[SIZE]) {
     for (int i = 0; i < ELLIPSOIDS; ++i)
         ov_l1_quadric(p->x + i * OV_L1_PARAMETERS, &quadrics[i]);
     for (int k = 0; k < POINTS; ++k)
-        u[k] = 2.0 * (reference_field(quadrics, ELLIPSOIDS, p->xyz + 3 * k).value - p->target[k]);
+        u[k] = 2.0 * (ov_twin_field(quadrics, ELLIPSOIDS, p->xyz + 3 * k).value - p->target[k]);
     for (int i = 0; i < ELLIPSOIDS; ++i) {
-        reference_sum sums[OV_MONOMIALS];
+        ov_twin_sum sums[OV_MONOMIALS];
         double moments[OV_MONOMIALS];
-        reference_moments(&quadrics[i], p->xyz, u, POINTS, sums);
+        ov_twin_moments(&quadrics[i], p->xyz, u, POINTS, sums);
         for (int m = 0; m < OV_MONOMIALS; ++m)
             moments[m] = sums[m].value;
         ov_l1_chain(p->x + i * OV_L1_PARAMETERS, moments, gradient + i * OV_L1_PARAMETERS);
@@ -51,7 +51,7 @@ static void chained(const problem *p, double gradient[SIZE]) {
 }
 
 static double accuracy(const problem *p) {
-    return reference_accuracy(p->x, ELLIPSOIDS, p->xyz, p->target, POINTS, INFINITY);
+    return ov_twin_accuracy(p->x, ELLIPSOIDS, p->xyz, p->target, POINTS, INFINITY);
 }
 
 /* Central difference of E_s with respect to one parameter, extrapolated to fourth order. */

@@ -2,7 +2,7 @@
  * Distances between meshes, against closed forms and against every triangle in double precision.
  */
 #include "measure/distance.h"
-#include "reference/distance.h"
+#include "selftest/twin_distance.h"
 #include "shapes.h"
 #include "support.h"
 
@@ -42,7 +42,7 @@ static void expect_distances(ovoid_context *context, const double *xyz, size_t v
     double worst = 0.0;
     for (size_t k = 0; k < count; ++k) {
         const double point[3] = {points[3 * k], points[3 * k + 1], points[3 * k + 2]};
-        const double wanted = reference_mesh_distance(point, mesh, false);
+        const double wanted = ov_twin_mesh_distance(point, mesh, false);
         const double got = sqrt((double)squared[k]);
         if (!(fabs(got - wanted) <= tolerance * fmax(wanted, 1.0)))
             fail_msg("point %zu (%g, %g, %g) is %.9g away instead of %.9g", k, point[0], point[1],
@@ -215,12 +215,11 @@ static void test_twin(void **state) {
         for (size_t v = 0; v < a->vertices; ++v)
             from_a[v] = -1.0f;
         test_check(context, ovoid_mesh_distances(context, a, b, outer, &got, from_a));
-        expect_same(got, reference_distances(a, b, outer));
+        expect_same(got, ov_twin_distances(a, b, outer));
         for (size_t v = 0; v < a->vertices; ++v) {
             const bool left_out = outer && a->component_of[v] == 1;
-            expect_near(from_a[v],
-                        left_out ? 0.0 : reference_mesh_distance(a->xyz + 3 * v, b, outer), 3e-6,
-                        "distance of a vertex");
+            expect_near(from_a[v], left_out ? 0.0 : ov_twin_mesh_distance(a->xyz + 3 * v, b, outer),
+                        3e-6, "distance of a vertex");
         }
         ovoid_distances same;
         a->along_curve = b->along_curve = true; /* taken as they are, which is no worse */
@@ -306,7 +305,7 @@ static void test_vertices(void **state) {
             used[from->corners[k]] = true;
         for (size_t v = 0; v < from->vertices; ++v)
             expect_near(got[v],
-                        used[v] ? reference_mesh_distance(full[n]->xyz + 3 * v, full[1 - n], false)
+                        used[v] ? ov_twin_mesh_distance(full[n]->xyz + 3 * v, full[1 - n], false)
                                 : 0.0,
                         3e-6, "distance of a vertex");
         expect_bounds(context, from, to, middle, got);
@@ -388,7 +387,7 @@ static void test_near_chunks(void **state) {
         test_check(context, ov_facets_distances(context, &meter, &facets, &sites, squared));
         for (size_t k = 0; k < count; ++k) {
             const double point[3] = {xyz[3 * k], xyz[3 * k + 1], xyz[3 * k + 2]};
-            const double wanted = reference_mesh_distance(point, mesh, false);
+            const double wanted = ov_twin_mesh_distance(point, mesh, false);
             expect_near(sqrt((double)squared[k]), wanted, 3e-6 * fmax(wanted, 1.0),
                         "distance of a site");
             off += wanted > 0.5;

@@ -23,7 +23,7 @@ static void is_the_product_of_the_papers_matrices(void **state) {
         double angle[3], r[3][3], wanted[3][3];
         angles_of(&random, n, angle);
         ov_rotation(angle, r);
-        reference_rotation(angle, wanted);
+        ov_twin_rotation(angle, wanted);
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j)
                 expect_near(r[i][j], wanted[i][j], 4 * DBL_EPSILON, "an entry of R");
@@ -65,8 +65,8 @@ static void derivatives_equal_central_differences(void **state) {
             memcpy(down, angle, sizeof down);
             up[k] += h;
             down[k] -= h;
-            reference_rotation(up, above);
-            reference_rotation(down, below);
+            ov_twin_rotation(up, above);
+            ov_twin_rotation(down, below);
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j)
                     expect_near(dr[k][i][j], (above[i][j] - below[i][j]) / (up[k] - down[k]), 1e-9,
@@ -91,8 +91,8 @@ static void form_equals_the_papers(void **state) {
                 double y[3];
                 for (int axis = 0; axis < 3; ++axis)
                     y[axis] = ellipsoids[n].centre[axis] + random_uniform(&random, -1.0, 1.0);
-                const double wanted = reference_ellipsoid(&ellipsoids[n], y);
-                const double got = quadric.amplitude * exp(-reference_exponent(&quadric, y));
+                const double wanted = ov_twin_ellipsoid(&ellipsoids[n], y);
+                const double got = quadric.amplitude * exp(-ov_twin_exponent(&quadric, y));
                 expect_near(got, wanted, 1e-13 * wanted, "an ellipsoid's value");
             }
         }
@@ -128,9 +128,9 @@ static void atom_is_its_gaussian(void **state) {
         const double d = random_uniform(&random, 0.1, 1.0);
         ov_quadric quadric;
         ov_quadric_of_atom(xyzr, d, &quadric);
-        const double wanted = reference_phi(xyzr, 1, d, y);
-        expect_near(quadric.amplitude * exp(-reference_exponent(&quadric, y)), wanted,
-                    1e-13 * wanted, "an atom's value");
+        const double wanted = ov_twin_phi(xyzr, 1, d, y);
+        expect_near(quadric.amplitude * exp(-ov_twin_exponent(&quadric, y)), wanted, 1e-13 * wanted,
+                    "an atom's value");
     }
 }
 

@@ -34,7 +34,7 @@ static void molecule_field_keeps_the_order(void **state) {
                   *const gradient = test_alloc(3 * count, sizeof *gradient);
     test_check(*state, once_molecule_field(*state, molecule, d, xyz, count, value, gradient));
     for (size_t k = 0; k < count; ++k) {
-        const double wanted = reference_phi(xyzr, ATOMS, d, xyz + 3 * k);
+        const double wanted = ov_twin_phi(xyzr, ATOMS, d, xyz + 3 * k);
         expect_near(value[k], wanted, 5e-6 * wanted + 1e-7 * ATOMS, "phi");
         for (size_t axis = 0; axis < 3; ++axis) {
             const double h = 1e-4;
@@ -44,7 +44,7 @@ static void molecule_field_keeps_the_order(void **state) {
             up[axis] += h;
             down[axis] -= h;
             const double slope =
-                (reference_phi(xyzr, ATOMS, d, up) - reference_phi(xyzr, ATOMS, d, down)) /
+                (ov_twin_phi(xyzr, ATOMS, d, up) - ov_twin_phi(xyzr, ATOMS, d, down)) /
                 (up[axis] - down[axis]);
             expect_near(gradient[3 * k + axis], slope, 2e-5 * wanted + 1e-6 * ATOMS,
                         "a component of phi's gradient");
@@ -73,15 +73,15 @@ static void model_field_is_the_papers_sum(void **state) {
         double wanted = 0.0, slope[3] = {0};
         for (size_t i = 0; i < size; ++i) {
             const double h = 1e-4;
-            wanted += reference_ellipsoid(&ellipsoids[i], xyz + 3 * k);
+            wanted += ov_twin_ellipsoid(&ellipsoids[i], xyz + 3 * k);
             for (int axis = 0; axis < 3; ++axis) {
                 double up[3], down[3];
                 memcpy(up, xyz + 3 * k, sizeof up);
                 memcpy(down, xyz + 3 * k, sizeof down);
                 up[axis] += h;
                 down[axis] -= h;
-                slope[axis] += (reference_ellipsoid(&ellipsoids[i], up) -
-                                reference_ellipsoid(&ellipsoids[i], down)) /
+                slope[axis] += (ov_twin_ellipsoid(&ellipsoids[i], up) -
+                                ov_twin_ellipsoid(&ellipsoids[i], down)) /
                                (up[axis] - down[axis]);
             }
         }
@@ -104,7 +104,7 @@ static void error_is_as_the_header_says(void **state) {
     double *const xyz = random_positions(count), *const value = test_alloc(count, sizeof *value);
     test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz, count, value, NULL));
     for (size_t k = 0; k < count; ++k) {
-        const double wanted = reference_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
+        const double wanted = ov_twin_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
         if (wanted > 0.1)
             worst = fmax(worst, fabs(value[k] - wanted) / wanted);
     }
@@ -126,7 +126,7 @@ static void more_than_a_million_points(void **state) {
                   *const gradient = test_alloc(3 * count, sizeof *gradient);
     test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz, count, value, gradient));
     for (size_t k = 0; k < count; k += k < count - 200 ? 997 : 1) {
-        const double wanted = reference_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
+        const double wanted = ov_twin_phi(xyzr, ATOMS, 0.5, xyz + 3 * k);
         expect_near(value[k], wanted, 5e-6 * wanted + 1e-7 * ATOMS, "phi");
     }
     double single[4];
@@ -152,7 +152,7 @@ static void odd_points(void **state) {
     test_check(*state, once_molecule_field(*state, molecule, 0.5, xyz, 4, value, NULL));
     assert_true(value[0] >= 0.0 && value[0] < 1e-30 && value[3] >= 0.0 && value[3] < 1e-30);
     assert_true(value[1] == value[2]);
-    expect_near(value[1], reference_phi(xyzr, ATOMS, 0.5, xyz + 3), 1e-5 * value[1], "phi");
+    expect_near(value[1], ov_twin_phi(xyzr, ATOMS, 0.5, xyz + 3), 1e-5 * value[1], "phi");
     ovoid_molecule_destroy(&molecule);
 }
 
@@ -167,7 +167,7 @@ static void point_beyond_single_precision(void **state) {
     test_check(*state, once_model_field(*state, model, xyz, 3, value, NULL));
     assert_true(value[0] >= 0.0 && value[0] < 1e-30);
     assert_true(value[2] >= 0.0 && value[2] < 1e-30);
-    const double wanted = reference_ellipsoid(&ellipsoid, xyz + 3);
+    const double wanted = ov_twin_ellipsoid(&ellipsoid, xyz + 3);
     expect_near(value[1], wanted, 2e-6 * wanted, "phi~");
     ovoid_model_destroy(&model);
 }
@@ -245,7 +245,7 @@ static double exact_field(const double *xyzr, size_t atoms, double d, const doub
     memset(gradient, 0, 3 * sizeof *gradient);
     for (size_t i = 0; i < atoms; ++i) {
         const double *const a = xyzr + 4 * i;
-        const double one = reference_phi(a, 1, d, at);
+        const double one = ov_twin_phi(a, 1, d, at);
         sum += one;
         for (int axis = 0; axis < 3; ++axis)
             gradient[axis] -= 2.0 * d * (at[axis] - a[axis]) * one;
@@ -369,7 +369,7 @@ static void model_that_reaches_far(void **state) {
     test_check(*state, ovoid_model_create(*state, &ellipsoid, 1, 0.5, 1.0, &model));
     test_check(*state, once_model_field(*state, model, xyz, 4, value, gradient));
     for (int k = 0; k < 2; ++k) {
-        const double wanted = reference_ellipsoid(&ellipsoid, xyz + 3 * k);
+        const double wanted = ov_twin_ellipsoid(&ellipsoid, xyz + 3 * k);
         expect_near(value[k], wanted, 2e-6 * wanted, "phi~");
     }
     for (int k = 6; k < 12; ++k)

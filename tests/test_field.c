@@ -3,7 +3,7 @@
  * field against closed forms.
  *
  * Tolerances are multiples of FLT_EPSILON times the conditioning that the twins report
- * (reference_sum): about one rounding of each exponent and one of each part of a sum.
+ * (ov_twin_sum): about one rounding of each exponent and one of each part of a sum.
  */
 #include "model/ellipsoid.h"
 #include "support.h"
@@ -35,8 +35,8 @@ static void field_equals_twin(void **state) {
         test_check(*state, ov_field(*state, &b.operations, &b.points, &b.terms, &b.lists, &value));
         float *const got = read_floats(*state, &value, b.points.packs * OV_PACK);
         for (size_t k = 0; k < b.count; ++k)
-            expect_close(got[k], reference_field(b.quadrics, b.terms_count, b.xyz + 3 * k),
-                         TOLERANCE, &worst, name_of(kind), k);
+            expect_close(got[k], ov_twin_field(b.quadrics, b.terms_count, b.xyz + 3 * k), TOLERANCE,
+                         &worst, name_of(kind), k);
         for (size_t k = b.count; k < b.points.packs * OV_PACK; ++k)
             assert_true(got[k] == got[b.count - 1]); /* the fill repeats the last point */
         print_message("field, %s: %.2f of %g\n", name_of(kind), worst, TOLERANCE);
@@ -55,7 +55,7 @@ static void field_is_accurate_to_two_millionths(void **state) {
     test_check(*state, ov_field(*state, &b.operations, &b.points, &b.terms, &b.lists, &value));
     float *const got = read_floats(*state, &value, b.count);
     for (size_t k = 0; k < b.count; ++k) {
-        const double wanted = reference_field(b.quadrics, b.terms_count, b.xyz + 3 * k).value;
+        const double wanted = ov_twin_field(b.quadrics, b.terms_count, b.xyz + 3 * k).value;
         if (wanted > 1e-2)
             worst = fmax(worst, fabs(got[k] - wanted) / wanted);
     }
@@ -84,7 +84,7 @@ static void polynomial_equals_twin(void **state) {
         for (size_t k = 0; k < b.count; ++k)
             expect_close(
                 got[k],
-                reference_field_polynomial(b.quadrics, coefficients, b.terms_count, b.xyz + 3 * k),
+                ov_twin_field_polynomial(b.quadrics, coefficients, b.terms_count, b.xyz + 3 * k),
                 TOLERANCE, &worst, name_of(kind), k);
         print_message("field_polynomial, %s: %.2f of %g\n", name_of(kind), worst, TOLERANCE);
         free(got);
@@ -110,7 +110,7 @@ static void polynomial_takes_each_monomial(void **state) {
         float *const got = read_floats(*state, &value, b.count);
         for (size_t k = 0; k < b.count; ++k)
             expect_close(got[k],
-                         reference_field_polynomial(b.quadrics, coefficients, 3, b.xyz + 3 * k),
+                         ov_twin_field_polynomial(b.quadrics, coefficients, 3, b.xyz + 3 * k),
                          TOLERANCE, NULL, "monomial", m);
         free(got);
     }
@@ -147,8 +147,8 @@ static void polynomial_is_weighted(void **state) {
         assert_true(got[k] == product);
     }
     for (size_t k = 0; k < b.count; ++k) {
-        reference_sum wanted =
-            reference_field_polynomial(b.quadrics, coefficients, b.terms_count, b.xyz + 3 * k);
+        ov_twin_sum wanted =
+            ov_twin_field_polynomial(b.quadrics, coefficients, b.terms_count, b.xyz + 3 * k);
         wanted.value *= weight[k];
         wanted.scale *= fabs((double)weight[k]);
         expect_close(got[k], wanted, TOLERANCE, &worst, "weighted value", k);
@@ -176,10 +176,10 @@ static void gradient_equals_twin(void **state) {
         float *const got = read_floats(*state, &value, b.count);
         float *const slope = read_floats(*state, &gradient, b.points.packs * 3 * OV_PACK);
         for (size_t k = 0; k < b.count; ++k) {
-            reference_sum wanted[3];
+            ov_twin_sum wanted[3];
             const double *const y = b.xyz + 3 * k;
-            reference_gradient(b.quadrics, b.terms_count, y, wanted);
-            expect_close(got[k], reference_field(b.quadrics, b.terms_count, y), TOLERANCE, &worst,
+            ov_twin_gradient(b.quadrics, b.terms_count, y, wanted);
+            expect_close(got[k], ov_twin_field(b.quadrics, b.terms_count, y), TOLERANCE, &worst,
                          "value", k);
             for (size_t axis = 0; axis < 3; ++axis)
                 expect_close(slope[k / OV_PACK * (3 * OV_PACK) + axis * OV_PACK + k % OV_PACK],
@@ -214,11 +214,11 @@ static void cut_off_loses_less_than_it_says(void **state) {
     float *const got = read_floats(*state, &value, count);
     for (size_t k = 0; k < count; ++k) {
         double left_out = 0.0;
-        const reference_sum wanted = reference_field(quadrics, terms, b.xyz + 3 * k);
+        const ov_twin_sum wanted = ov_twin_field(quadrics, terms, b.xyz + 3 * k);
         const double rounding = TOLERANCE * FLT_EPSILON * wanted.scale;
         for (size_t i = 0; i < terms; ++i) {
             const double e =
-                quadrics[i].amplitude * exp(-reference_exponent(&quadrics[i], b.xyz + 3 * k));
+                quadrics[i].amplitude * exp(-ov_twin_exponent(&quadrics[i], b.xyz + 3 * k));
             left_out += e < cutoff * (1.0 + 1e-4) ? e : 0.0;
         }
         assert_true(got[k] <= wanted.value + rounding);
@@ -345,7 +345,7 @@ static void ellipsoid_has_its_semi_axes(void **state) {
         random_ellipsoids(&random, MODEL_RANDOM, 0.0, &ellipsoid, 1);
         ellipsoid.amplitude = exp(random_uniform(&random, 1.0, 3.0));
         ov_quadric_of_ellipsoid(&ellipsoid, &quadric);
-        reference_rotation(ellipsoid.angle, r);
+        ov_twin_rotation(ellipsoid.angle, r);
         for (int p = 0; p < 3; ++p)
             for (int end = 0; end < 2; ++end)
                 for (int axis = 0; axis < 3; ++axis)
@@ -357,7 +357,7 @@ static void ellipsoid_has_its_semi_axes(void **state) {
         bench_create(&b, *state, &quadric, 1, xyz, 6, 1e-7);
         float *const got = evaluate(&b, *state);
         for (int k = 0; k < 6; ++k) {
-            const double scale = reference_field(&quadric, 1, b.xyz + 3 * k).scale;
+            const double scale = ov_twin_field(&quadric, 1, b.xyz + 3 * k).scale;
             expect_near(got[k], c, 4.0 * FLT_EPSILON * scale, "phi~ at the end of a semi-axis");
         }
         free(got);
@@ -419,7 +419,7 @@ static void far_from_the_origin(void **state) {
     for (size_t k = 0; k < COUNT; ++k) {
         const float *const p = xyz + 3 * (size_t)points.order[k];
         const double y[3] = {p[0], p[1], p[2]};
-        expect_close(got[k], reference_field(near, TERMS, y), TOLERANCE, NULL, "value", k);
+        expect_close(got[k], ov_twin_field(near, TERMS, y), TOLERANCE, NULL, "value", k);
     }
     free(got);
     free(xyz);

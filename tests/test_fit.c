@@ -64,7 +64,7 @@ static void expect_result(ovoid_context *context, const ovoid_molecule *molecule
     test_check(context, once_model_field(context, model, xyz, count, fitted, NULL));
     double square = 0.0, largest = 0.0;
     for (size_t k = 0; k < count; ++k) {
-        const double error = reference_residual(fitted[k], phi[k], inside);
+        const double error = ov_twin_residual(fitted[k], phi[k], inside);
         square += error * error;
         largest = fmax(largest, fabs(error));
     }

@@ -48,9 +48,9 @@ static void expect_gathered(ovoid_context *context, const ov_points *from, const
     float *const wanted = test_alloc(count * 3 * PACK, sizeof *wanted);
     assert_int_equal(to->packs, count);
     assert_memory_equal(to->origin, from->origin, sizeof to->origin);
-    reference_gather(list, count, 3 * PACK, all, wanted);
+    ov_twin_gather(list, count, 3 * PACK, all, wanted);
     assert_memory_equal(some, wanted, count * 3 * PACK * sizeof *some);
-    reference_gather(list, count, 4, from->pack_origin, wanted);
+    ov_twin_gather(list, count, 4, from->pack_origin, wanted);
     assert_memory_equal(origins, wanted, 4 * count * sizeof *origins);
     assert_memory_equal(to->pack_origin, wanted, 4 * count * sizeof *origins);
     assert_memory_equal(to->host_boxes, boxes, tree_floats(&to->tree) * sizeof *boxes);
@@ -136,10 +136,10 @@ static void targets_are_gathered(void **state) {
            some);
     for (int k = 0; k < TARGETS; ++k) {
         float *const got = read_floats(context, &gathered[k], (some + 1) * PACK);
-        reference_gather(list, some, PACK, all[k], wanted);
+        ov_twin_gather(list, some, PACK, all[k], wanted);
         for (size_t j = 0; j < some * PACK; ++j)
             assert_true(got[j] ==
-                        (k == WEIGHT ? wanted[j] : (float)reference_rest(wanted[j], values[j])));
+                        (k == WEIGHT ? wanted[j] : (float)ov_twin_rest(wanted[j], values[j])));
         assert_memory_equal(got + some * PACK, all[k] + some * PACK, PACK * sizeof *got);
         free(got);
     }
@@ -180,7 +180,7 @@ static void targets_are_scattered(void **state) {
         float *const got = read_floats(context, &device[k], packs * PACK);
         for (size_t n = 0; n < some; ++n)
             memcpy(own + n * PACK, fresh + (n * TARGETS + k) * PACK, PACK * sizeof *own);
-        reference_scatter(list, some, PACK, own, all[k]);
+        ov_twin_scatter(list, some, PACK, own, all[k]);
         assert_memory_equal(got, all[k], packs * PACK * sizeof *got);
         free(got);
         free(all[k]);

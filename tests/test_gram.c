@@ -55,8 +55,8 @@ static void expect_gram(bench *b, const float *w, double *worst, const char *wha
     float *const got = gram_of(b, w);
     double *const weights = in_double(w, b->count);
     for (size_t i = 0; i < b->terms_count; ++i) {
-        reference_sum wanted[OV_GRAM];
-        reference_gram(&b->quadrics[i], b->xyz, weights, b->count, wanted);
+        ov_twin_sum wanted[OV_GRAM];
+        ov_twin_gram(&b->quadrics[i], b->xyz, weights, b->count, wanted);
         for (size_t m = 0; m < OV_GRAM; ++m)
             expect_close(got[i * OV_GRAM + m], wanted[m], tolerance_of(b), worst, what,
                          i * OV_GRAM + m);
@@ -205,8 +205,8 @@ static void long_lists_do_not_drift(void **state) {
         w[k] = 0.1f;
     float *const got = gram_of(&b, w);
     double *const weights = in_double(w, count);
-    reference_sum wanted[OV_GRAM];
-    reference_gram(&quadric, b.xyz, weights, count, wanted);
+    ov_twin_sum wanted[OV_GRAM];
+    ov_twin_gram(&quadric, b.xyz, weights, count, wanted);
     double worst = 0.0;
     for (size_t m = 0; m < OV_GRAM; ++m) {
         const double error = fabs(got[m] - wanted[m].value) / fabs(wanted[m].value);
@@ -234,11 +234,11 @@ static void long_lists_are_accurate(void **state) {
     float *const got = gram_of(&b, w);
     double *const weights = in_double(w, count);
     double magnitude[OV_GRAM] = {0}, worst = 0.0;
-    reference_sum wanted[OV_GRAM];
-    reference_gram(&quadric, b.xyz, weights, count, wanted);
+    ov_twin_sum wanted[OV_GRAM];
+    ov_twin_gram(&quadric, b.xyz, weights, count, wanted);
     for (size_t k = 0; k < count; ++k) {
-        reference_sum one[OV_GRAM];
-        reference_gram(&quadric, b.xyz + 3 * k, weights + k, 1, one);
+        ov_twin_sum one[OV_GRAM];
+        ov_twin_gram(&quadric, b.xyz + 3 * k, weights + k, 1, one);
         for (size_t m = 0; m < OV_GRAM; ++m)
             magnitude[m] += fabs(one[m].value);
     }
@@ -280,7 +280,7 @@ static void lattice_gives_gaussian_integrals(void **state) {
     float *const got = gram_of(&b, w);
 
     double r[3][3], s[3][3];
-    reference_rotation(ellipsoid.angle, r);
+    ov_twin_rotation(ellipsoid.angle, r);
     const double *const d = ellipsoid.decay, a = ellipsoid.amplitude;
     const double mass = a * a * pow(PI, 1.5) / sqrt(8.0 * d[0] * d[1] * d[2]);
     for (int i = 0; i < 3; ++i)

@@ -171,7 +171,7 @@ static size_t points_of(ovoid_context *context, const double *xyzr, size_t atoms
     *xyz = read_places(context, &samples.points);
     *target = test_alloc(count, sizeof **target);
     for (size_t k = 0; k < count; ++k)
-        (*target)[k] = reference_phi(xyzr, atoms, options->decay, *xyz + 3 * k);
+        (*target)[k] = ov_twin_phi(xyzr, atoms, options->decay, *xyz + 3 * k);
     ov_samples_destroy(&samples);
     return count;
 }
@@ -244,9 +244,9 @@ static void expect_step(ovoid_context *context, ovoid_kernel kernel, uint32_t in
     for (size_t j = 0; j < 10 * ATOMS; ++j) {
         const double h = 1e-4, middle = x[j];
         x[j] = middle + h;
-        const double up = reference_accuracy(x, ATOMS, xyz, target, points, limit);
+        const double up = ov_twin_accuracy(x, ATOMS, xyz, target, points, limit);
         x[j] = middle - h;
-        const double down = reference_accuracy(x, ATOMS, xyz, target, points, limit);
+        const double down = ov_twin_accuracy(x, ATOMS, xyz, target, points, limit);
         x[j] = middle;
         const double accuracy =
             j % 10 < moving ? step->l1.accuracy_weight * (up - down) / (2.0 * h) : 0.0;
@@ -520,7 +520,7 @@ static double least_inside(ovoid_context *context, const double *xyzr, size_t at
     for (size_t k = 0; k < points; ++k) {
         double value = 0.0;
         for (size_t i = 0; i < count; ++i)
-            value += reference_ellipsoid(ovoid_model_ellipsoids(run.model) + i, xyz + 3 * k);
+            value += ov_twin_ellipsoid(ovoid_model_ellipsoids(run.model) + i, xyz + 3 * k);
         if (target[k] > options.isovalue + 1.0) {
             least = fmin(least, value);
             ++inside;
@@ -623,13 +623,13 @@ static void result_is_the_last_record(void **state) {
                 "the rms error");
     assert_true(result->l1.max_error == last->l1.max_error);
     double *const x = parameters_of(run.model);
-    expect_near(last->l1.sparse_term, reference_sparsity(x, (size_t)result->ellipsoids),
+    expect_near(last->l1.sparse_term, ov_twin_sparsity(x, (size_t)result->ellipsoids),
                 1e-9 * last->l1.sparse_term, "E_l1");
     /* and E_s that of the model, by the paper's formula */
     double *xyz, *target;
     const size_t points = points_of(*state, clump, ATOMS, &options, &xyz, &target);
     const double accuracy =
-        reference_accuracy(x, (size_t)result->ellipsoids, xyz, target, points, limit_of(&options));
+        ov_twin_accuracy(x, (size_t)result->ellipsoids, xyz, target, points, limit_of(&options));
     expect_near(last->l1.accuracy_term, accuracy, 2e-3 * accuracy, "E_s");
     free(x);
     free(xyz);

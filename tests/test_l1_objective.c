@@ -156,11 +156,11 @@ static void lists_follow_moving_ellipsoids(void **state) {
                 ov_l1_quadric(x + i * SIZE, &quadrics[i]);
             for (size_t k = 0; k < count; ++k) {
                 double below = 0.0;
-                const reference_sum wanted = reference_field(quadrics, terms, xyz + 3 * k);
+                const ov_twin_sum wanted = ov_twin_field(quadrics, terms, xyz + 3 * k);
                 const double rounding = 8.0 * FLT_EPSILON * wanted.scale + 1e-9;
                 for (size_t i = 0; i < terms; ++i) {
                     const double e =
-                        quadrics[i].amplitude * exp(-reference_exponent(&quadrics[i], xyz + 3 * k));
+                        quadrics[i].amplitude * exp(-ov_twin_exponent(&quadrics[i], xyz + 3 * k));
                     below += e < CUTOFF * 1.001 ? e : 0.0;
                 }
                 if (value[k] < wanted.value - below - rounding)
@@ -168,7 +168,7 @@ static void lists_follow_moving_ellipsoids(void **state) {
                              step, value[k], wanted.value);
                 assert_true(value[k] <= wanted.value + rounding);
                 most = fmax(most, wanted.value - value[k]);
-                const double error = reference_residual(value[k], targets[k], limit);
+                const double error = ov_twin_residual(value[k], targets[k], limit);
                 accuracy += error * error;
                 largest = fmax(largest, fabs(error));
             }
@@ -206,7 +206,7 @@ static void lists_follow_pruning(void **state) {
         x[i] = random_uniform(&random, 0.5, 1.5);
     for (size_t count = TERMS; count > 0; --count) {
         test_check(*state, ov_l1_evaluate(&objective, x, count, &result));
-        const double wanted = reference_accuracy(x, count, xyz, targets, COUNT, INFINITY);
+        const double wanted = ov_twin_accuracy(x, count, xyz, targets, COUNT, INFINITY);
         expect_near(result.accuracy, wanted, 1e-4 * wanted, "E_s");
         if (count % 2 == 0) /* the first one goes, else the last */
             memmove(x, x + SIZE, (count - 1) * SIZE * sizeof *x);
@@ -221,8 +221,8 @@ static void lists_follow_pruning(void **state) {
 
 static double objective_of(const double *x, size_t terms, const double *xyz, const double *targets,
                            size_t count, double limit, ov_l1_weights w) {
-    return w.accuracy * reference_accuracy(x, terms, xyz, targets, count, limit) +
-           w.sparse * reference_sparsity(x, terms);
+    return w.accuracy * ov_twin_accuracy(x, terms, xyz, targets, count, limit) +
+           w.sparse * ov_twin_sparsity(x, terms);
 }
 
 typedef enum shape { RANDOM, NEEDLE, PANCAKE, SPHERE, GIMBAL, NEGATIVE, SHAPES } shape;
@@ -308,8 +308,8 @@ static void gradient_equals_central_differences(void **state) {
                 snprintf(what, sizeof what, "shape %d: component %zu of the gradient", kind, j);
                 expect_near(gradient[j], slope[j], 1e-4 * largest, what);
             }
-            expect_near(ov_l1_sparse_term(&objective, x, TERMS), reference_sparsity(x, TERMS),
-                        1e-12, "E_l1");
+            expect_near(ov_l1_sparse_term(&objective, x, TERMS), ov_twin_sparsity(x, TERMS), 1e-12,
+                        "E_l1");
             ov_l1_objective_destroy(&objective);
             ov_samples_destroy(&samples);
             free(targets);

@@ -87,7 +87,7 @@ static void expect_pairs(const bench *b, const pairs *p, double cutoff, double s
         for (size_t pack = 0; pack < p->packs; ++pack) {
             double box[6];
             pack_box(b, pack, skin, box);
-            const double least = reference_least_exponent(&b->quadrics[i], box);
+            const double least = ov_twin_least_exponent(&b->quadrics[i], box);
             const bool listed = holds(p->term_start, p->term_item, i, (uint32_t)pack);
             if (least <= reach - 1e-3 && !listed)
                 fail_msg("term %zu, pack %zu: least exponent %g, reach %g, not listed", i, pack,

@@ -133,7 +133,7 @@ static bool sees_all(const ov_local *local, const row *r, const double *x) {
     ov_quadric quadric;
     ov_factor_quadric(x, &quadric);
     for (size_t k = 0; k < r->s.points; ++k) {
-        bool kept = reference_field(&quadric, 1, r->s.xyz + 3 * k).value < 1e-3;
+        bool kept = ov_twin_field(&quadric, 1, r->s.xyz + 3 * k).value < 1e-3;
         for (size_t n = 0; n < local->points.packs && !kept; ++n)
             kept = local->packs.pack[n] == k / OV_PACK;
         if (!kept)

@@ -211,7 +211,7 @@ static void compare(const map *m, const subject *s, double spacing, double isova
         if (k % stride)
             continue;
         point_of(m, k, x);
-        reference_sum wanted = reference_field(s->quadrics, s->count, x);
+        ov_twin_sum wanted = ov_twin_field(s->quadrics, s->count, x);
         wanted.scale += rounding / FLT_EPSILON * wanted.value + 1e-5; /* origin rounded to float */
         wanted.scale += 2e-7 * (double)s->count / FLT_EPSILON;        /* the cut-off */
         expect_close(value, wanted, 8.0, NULL, "value", k);
@@ -475,7 +475,7 @@ static void find_numbers(const char *text, const char *label, double *numbers, i
 static const double probe[3] = {20.8, -2.8, 0.8}; /* a multiple of the spacing 0.4 */
 
 static void expect_probe(const subject *s, double value) {
-    expect_near(value, reference_field(s->quadrics, s->count, probe).value, 1e-4, "field");
+    expect_near(value, ov_twin_field(s->quadrics, s->count, probe).value, 1e-4, "field");
 }
 
 static void gemmi_reads_it(void **state) {

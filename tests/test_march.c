@@ -11,7 +11,7 @@
 #include "mesh/mesh.h"
 #include "model/ellipsoid.h"
 #include "model/model.h"
-#include "reference/march.h"
+#include "selftest/twin_march.h"
 
 #define PI 3.14159265358979323846
 #define APBS_FAS2 "/usr/share/apbs/examples/misc/fas2.pqr"
@@ -237,10 +237,10 @@ static int64_t expect_surface(const ovoid_mesh *mesh, const ov_quadric *quadrics
     for (size_t v = 0; v < ovoid_mesh_vertices(mesh); ++v) {
         const double *const y = ovoid_mesh_xyz(mesh) + 3 * v;
         const float *const n = ovoid_mesh_normals(mesh) + 3 * v;
-        reference_sum gradient[3];
+        ov_twin_sum gradient[3];
         int64_t low[3];
-        const reference_sum phi = reference_field(quadrics, count, y);
-        reference_gradient(quadrics, count, y, gradient);
+        const ov_twin_sum phi = ov_twin_field(quadrics, count, y);
+        ov_twin_gradient(quadrics, count, y, gradient);
         const unsigned axis = edge_of(mesh, v, options->spacing, low);
         const double length =
             sqrt(gradient[0].value * gradient[0].value + gradient[1].value * gradient[1].value +
@@ -521,7 +521,7 @@ static void sort_triangles(uint32_t *corner, size_t triangles) {
     qsort(corner, triangles, 3 * sizeof *corner, compare_triangles);
 }
 
-static void expect_same(const ovoid_mesh *mesh, reference_mesh *wanted, double accuracy) {
+static void expect_same(const ovoid_mesh *mesh, ov_twin_mesh *wanted, double accuracy) {
     const size_t triangles = ovoid_mesh_triangles(mesh), vertices = ovoid_mesh_vertices(mesh);
     assert_int_equal(vertices, wanted->vertices);
     assert_int_equal(triangles, wanted->triangles);
@@ -538,7 +538,7 @@ static void expect_same(const ovoid_mesh *mesh, reference_mesh *wanted, double a
             point = point * wanted->size[k] + (size_t)(low[k] - wanted->low[k]);
         }
         name[v] = wanted->vertex[3 * point + axis];
-        assert_true(name[v] != REFERENCE_NO_VERTEX);
+        assert_true(name[v] != OV_TWIN_NO_VERTEX);
         assert_false(taken[name[v]]);
         taken[name[v]] = true;
         expect_near(ovoid_mesh_xyz(mesh)[3 * v + axis], wanted->xyz[3 * (size_t)name[v] + axis],
@@ -564,9 +564,9 @@ static void pieces_give_the_plain_mesh(void **state) {
     ov_quadric *quadrics;
     ov_body *const bodies = noise(&random, count, half, &quadrics);
     const ovoid_mesh_options options = options_of(1.0, spacing, OVOID_VERTEX_LINEAR);
-    reference_mesh wanted;
-    reference_march(quadrics, count, 1.0, spacing, (const int64_t[3]){low, low, low},
-                    (const size_t[3]){box, box, box}, &wanted);
+    ov_twin_mesh wanted;
+    assert_true(ov_twin_march(quadrics, count, 1.0, spacing, (const int64_t[3]){low, low, low},
+                              (const size_t[3]){box, box, box}, &wanted));
     for (size_t k = 0; k < sizeof limits / sizeof limits[0]; ++k) {
         ovoid_mesh *mesh = NULL;
         if (test_small() && k > 1)
@@ -578,7 +578,7 @@ static void pieces_give_the_plain_mesh(void **state) {
         expect_same(mesh, &wanted, 1e-5);
         ovoid_mesh_destroy(&mesh);
     }
-    reference_mesh_destroy(&wanted);
+    ov_twin_mesh_destroy(&wanted);
     free(bodies);
     free(quadrics);
 }
@@ -693,15 +693,15 @@ static void pieces_reach_as_far_as_the_surface(void **state) {
             xyzr[axis] = random_uniform(&random, -0.8, 0.8);
         xyzr[3] = random_uniform(&random, 0.7, 1.8);
         ov_body body;
-        reference_mesh wanted;
+        ov_twin_mesh wanted;
         ovoid_mesh *mesh = NULL;
         ov_body_of_atom(xyzr, 0.5, &body);
-        reference_march(&body.quadric, 1, 1.0, spacing, low, box, &wanted);
+        assert_true(ov_twin_march(&body.quadric, 1, 1.0, spacing, low, box, &wanted));
         test_check(*state, ov_march(*state, &body, 1, &options, limit, &mesh));
         assert_int_equal(expect_closed(mesh), 2);
         expect_same(mesh, &wanted, 1e-5);
         ovoid_mesh_destroy(&mesh);
-        reference_mesh_destroy(&wanted);
+        ov_twin_mesh_destroy(&wanted);
     }
 }
 

@@ -10,7 +10,7 @@
 enum { P = OV_FACTOR_PARAMETERS };
 
 static double value_of(const ov_quadric *quadric, const double y[3]) {
-    return quadric->amplitude * exp(-reference_exponent(quadric, y));
+    return quadric->amplitude * exp(-ov_twin_exponent(quadric, y));
 }
 
 static double square_residual(double value, double low, double high) {
@@ -41,7 +41,7 @@ static void make_charges(const bench *b, test_random *random, charges *c) {
     c->high = test_alloc(all, sizeof *c->high);
     c->weight = test_alloc(all, sizeof *c->weight);
     for (size_t k = 0; k < b->count; ++k) {
-        const double phi = reference_field(b->quadrics, b->terms_count, b->xyz + 3 * k).value;
+        const double phi = ov_twin_field(b->quadrics, b->terms_count, b->xyz + 3 * k).value;
         c->value[k] = (float)phi;
         c->low[k] = c->high[k] = (float)(phi * random_uniform(random, 0.7, 1.3));
         if (k % 3 == 0)
@@ -98,16 +98,16 @@ static float *run_losses(bench *b, const charges *c, const uint32_t *pairs,
 }
 
 /* The loss over the points of the packs in `counted`, every one if that is NULL. */
-static reference_sum twin_loss(const bench *b, const charges *c, uint32_t i, uint32_t j,
-                               const ov_quadric *merged, const bool *counted) {
-    reference_sum sum = {0};
+static ov_twin_sum twin_loss(const bench *b, const charges *c, uint32_t i, uint32_t j,
+                             const ov_quadric *merged, const bool *counted) {
+    ov_twin_sum sum = {0};
     for (size_t k = 0; k < b->count; ++k) {
         if (counted && !counted[k / OV_PACK])
             continue;
         const double *const y = b->xyz + 3 * k;
-        const reference_sum ei = reference_field(&b->quadrics[i], 1, y),
-                            ej = reference_field(&b->quadrics[j], 1, y),
-                            em = reference_field(merged, 1, y);
+        const ov_twin_sum ei = ov_twin_field(&b->quadrics[i], 1, y),
+                          ej = ov_twin_field(&b->quadrics[j], 1, y),
+                          em = ov_twin_field(merged, 1, y);
         const double before = c->value[k], after = before - ei.value - ej.value + em.value;
         const double a = square_residual(after, c->low[k], c->high[k]),
                      s = square_residual(before, c->low[k], c->high[k]);
@@ -157,8 +157,8 @@ static void expect_losses(bench *b, uint64_t seed, bool every_point, const char 
     float *const loss = run_losses(b, &c, pairs, merged, count);
     for (size_t n = 0; n < count; ++n) {
         bool *const listed = packs_of_pair(b, pairs + 2 * n);
-        const reference_sum wanted = twin_loss(b, &c, pairs[2 * n], pairs[2 * n + 1], &merged[n],
-                                               every_point ? NULL : listed);
+        const ov_twin_sum wanted = twin_loss(b, &c, pairs[2 * n], pairs[2 * n + 1], &merged[n],
+                                             every_point ? NULL : listed);
         expect_close(loss[n], wanted, 2.0, &worst, "loss", n);
         free(listed);
     }
@@ -402,7 +402,7 @@ static double model_loss(const model *m, const double *x, size_t count, size_t i
     assert_true(merge_quadrics(&quadrics[i], &quadrics[j], &merged));
     for (size_t k = 0; k < m->points; ++k) {
         const double *const y = m->xyz + 3 * k;
-        const double before = reference_field(quadrics, count, y).value;
+        const double before = ov_twin_field(quadrics, count, y).value;
         const double after =
             before - value_of(&quadrics[i], y) - value_of(&quadrics[j], y) + value_of(&merged, y);
         loss += m->weight[k] * (square_residual(after, m->low[k], m->high[k]) -
@@ -624,7 +624,7 @@ static double twin_share(const model *m, const ov_quadric *quadrics, size_t i) {
     double share = 0.0;
     for (size_t k = 0; k < m->points; ++k) {
         const double *const y = m->xyz + 3 * k;
-        const double phi = reference_field(quadrics, m->count, y).value;
+        const double phi = ov_twin_field(quadrics, m->count, y).value;
         share += m->weight[k] * square_residual(phi, m->low[k], m->high[k]) *
                  value_of(&quadrics[i], y) / fmax(phi, 1e-3);
     }

@@ -44,8 +44,8 @@ static double *in_double(const float *values, size_t count) {
 static void expect_moments(bench *b, const float *u, double *worst, const char *what) {
     double *const got = moments_of(b, u), *const weights = in_double(u, b->count);
     for (size_t i = 0; i < b->terms_count; ++i) {
-        reference_sum wanted[OV_MONOMIALS];
-        reference_moments(&b->quadrics[i], b->xyz, weights, b->count, wanted);
+        ov_twin_sum wanted[OV_MONOMIALS];
+        ov_twin_moments(&b->quadrics[i], b->xyz, weights, b->count, wanted);
         for (size_t m = 0; m < OV_MONOMIALS; ++m)
             expect_close(got[i * OV_MONOMIALS + m], wanted[m], TOLERANCE, worst, what,
                          i * OV_MONOMIALS + m);
@@ -170,9 +170,9 @@ static void long_lists_that_cancel(void **state) {
     for (size_t k = 0; k < count; ++k)
         u[k] = random_bits(&random) % 2 ? 1.0f : -1.0f;
     double *const got = moments_of(&b, u), *const weights = in_double(u, count);
-    reference_sum wanted[OV_MONOMIALS];
+    ov_twin_sum wanted[OV_MONOMIALS];
     double worst = 0.0;
-    reference_moments(&quadric, b.xyz, weights, count, wanted);
+    ov_twin_moments(&quadric, b.xyz, weights, count, wanted);
     for (size_t m = 0; m < OV_MONOMIALS; ++m)
         expect_close(got[m], wanted[m], 0.1, &worst, "moment", m);
     print_message("%zu weights of either sign: %.4f of 0.1\n", count, worst);
@@ -209,7 +209,7 @@ static void lattice_gives_gaussian_integrals(void **state) {
     double *const got = moments_of(&b, u);
 
     double r[3][3];
-    reference_rotation(ellipsoid.angle, r);
+    ov_twin_rotation(ellipsoid.angle, r);
     const double *const d = ellipsoid.decay;
     const double mass = ellipsoid.amplitude * pow(PI, 1.5) / sqrt(d[0] * d[1] * d[2]);
     expect_near(got[0], mass, 1e-5 * mass, "the integral of an ellipsoid");
@@ -291,7 +291,7 @@ static void empty_lists_give_zeros(void **state) {
 
 /* ---- residual ----------------------------------------------------------------------------- */
 
-/* reference_residual(), in the kernel's precision. */
+/* ov_twin_residual(), in the kernel's precision. */
 static float single_residual(float value, float target, float limit) {
     if (target > limit)
         return value < limit ? value - limit : 0.0f;

@@ -107,6 +107,9 @@ static void contexts_and_devices(void **state) {
     ANSWERS(NULL, ovoid_context_device, NULL);
     ANSWERS(0, ovoid_context_count, NULL, OVOID_COUNT_LAUNCHES);
     REFUSED(ovoid_context_profile, context, NULL, true);
+    REFUSED(ovoid_selftest, context, NULL, NULL, NULL, NULL, NULL);
+    DOES_NOTHING(ovoid_selftest_options_init, NULL, sizeof(ovoid_selftest_options));
+    DOES_NOTHING(ovoid_selftest_result_init, NULL, sizeof(ovoid_selftest_result));
     REFUSED(ovoid_context_kernel_times, context, NULL, &times, &count);
     REFUSED(ovoid_context_kernel_times, times, c, NULL, &count);
     REFUSED(ovoid_context_kernel_times, count, c, &times, NULL);
@@ -147,7 +150,9 @@ static void defaults(void **state) {
     DOES_NOTHING(ovoid_measures_init, NULL, sizeof(ovoid_measures));
     DOES_NOTHING(ovoid_measure_options_init, NULL, sizeof(ovoid_measure_options));
     DOES_NOTHING(ovoid_export_options_init, NULL, sizeof(ovoid_export_options));
+    DOES_NOTHING(ovoid_scene_init, NULL, sizeof(ovoid_scene));
     DOES_NOTHING(ovoid_picture_options_init, NULL, sizeof(ovoid_picture_options));
+    ANSWERS(0, ovoid_sizeof, NULL);
 }
 
 /* Nothing can be NULL in a call of these. */
@@ -176,6 +181,17 @@ static void molecules(void **state) {
     REFUSED(ovoid_molecule_create, context, NULL, xyzr, 1, &made);
     REFUSED(ovoid_molecule_create, xyzr, c, NULL, 1, &made);
     REFUSED(ovoid_molecule_create, molecule, c, xyzr, 1, NULL);
+    const ovoid_atom atom = {.name = "C"};
+    const ovoid_residue residue = {.name = "C"};
+    const ovoid_radii own = OVOID_RADII_OWN;
+#define KNOWN(argument, c, x, a, r, out)                                                           \
+    REFUSED(ovoid_molecule_create_known, argument, c, x, a, 1, r, 1, own, NULL, out)
+    KNOWN(context, NULL, xyzr, &atom, &residue, &made);
+    KNOWN(xyzr, c, NULL, &atom, &residue, &made);
+    KNOWN(identity, c, xyzr, NULL, &residue, &made);
+    KNOWN(residues, c, xyzr, &atom, NULL, &made);
+    KNOWN(molecule, c, xyzr, &atom, &residue, NULL);
+#undef KNOWN
     REFUSED(ovoid_molecule_expand, context, NULL, all.molecule);
     REFUSED(ovoid_molecule_expand, molecule, c, NULL);
     ANSWERS(0, ovoid_molecule_atoms, NULL);
@@ -371,6 +387,11 @@ static void exports_and_pictures(void **state) {
     REFUSED(ovoid_field_export, context, NULL, all.field, "a.bild", NULL);
     REFUSED(ovoid_field_export, field, c, NULL, "a.bild", NULL);
     REFUSED(ovoid_field_export, path, c, all.field, NULL, NULL);
+    ovoid_scene scene;
+    ovoid_scene_init(&scene, sizeof scene);
+    REFUSED(ovoid_scene_export, context, NULL, &scene, "a.bild", NULL);
+    REFUSED(ovoid_scene_export, scene, c, NULL, "a.bild", NULL);
+    REFUSED(ovoid_scene_export, path, c, &scene, NULL, NULL);
     ANSWERS(OVOID_EXPORT_AUTO, ovoid_export_format_find, NULL);
     REFUSED(ovoid_render, context, NULL, all.field, all.field, &options, &made);
     REFUSED(ovoid_render, options, c, all.field, all.field, NULL, &made);

@@ -62,7 +62,7 @@ static double misfit_of(const scene *s, const double *x) {
     for (size_t i = 0; i < s->count; ++i)
         ov_factor_quadric(x + i * P, &quadrics[i]);
     for (size_t k = 0; k < s->points; ++k) {
-        const double value = reference_field(quadrics, s->count, s->xyz + 3 * k).value;
+        const double value = ov_twin_field(quadrics, s->count, s->xyz + 3 * k).value;
         const double r = value - fmin(fmax(value, low[k]), high[k]);
         sum += (double)weight[k] * r * r;
     }
@@ -90,7 +90,7 @@ static void expect_covered(const ov_refiner *refiner, const scene *s, const doub
             for (uint32_t n = start[pack]; n < start[pack + 1] && !listed; ++n)
                 listed = item[n] == i;
             for (size_t k = pack * OV_PACK; k < (pack + 1) * OV_PACK && !listed; ++k)
-                if (reference_field(&quadrics[i], 1, s->xyz + 3 * k).value > 1.001 * CUTOFF)
+                if (ov_twin_field(&quadrics[i], 1, s->xyz + 3 * k).value > 1.001 * CUTOFF)
                     fail_msg("ellipsoid %u is missing in pack %zu", i, pack);
         }
     free(start);
@@ -151,7 +151,7 @@ static void evaluation_equals_twin(void **state) {
     for (size_t i = 0; i < p.s.count; ++i)
         ov_factor_quadric(p.x + i * P, &quadrics[i]);
     for (size_t k = 0; k < p.s.points; ++k) {
-        const double phi = reference_field(quadrics, p.s.count, p.s.xyz + 3 * k).value;
+        const double phi = ov_twin_field(quadrics, p.s.count, p.s.xyz + 3 * k).value;
         expect_near(value[k], phi, CUTOFF * (double)p.s.count + 1e-5 * phi, "a value");
     }
     free(value);

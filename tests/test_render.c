@@ -9,7 +9,7 @@
 #include "picture/palette.h"
 #include "picture/rays.h"
 #include "picture/render.h"
-#include "reference/render.h"
+#include "selftest/twin_render.h"
 
 #include <png.h>
 #include <unistd.h>
@@ -151,10 +151,8 @@ static void rays_are_the_references(void **state) {
             for (uint32_t column = 0; column < side; ++column) {
                 const size_t at = ov_rays_index(&v.rays, column, row);
                 const double x = ray_x(&v.rays, column), y = ray_y(&v.rays, row);
-                const double later =
-                    reference_hit(quadrics, terms, 1.0003 * c, x, y, depth, -depth);
-                const double sooner =
-                    reference_hit(quadrics, terms, 0.9997 * c, x, y, depth, -depth);
+                const double later = ov_twin_hit(quadrics, terms, 1.0003 * c, x, y, depth, -depth);
+                const double sooner = ov_twin_hit(quadrics, terms, 0.9997 * c, x, y, depth, -depth);
                 const double z = v.depth[at] > OV_NOWHERE ? (double)v.depth[at] : -INFINITY;
                 if (!(z >= later - 1e-4 && z <= sooner + 1e-4))
                     fail_msg("%s: ray (%g, %g) ends at %g, not within %g .. %g",
@@ -164,7 +162,7 @@ static void rays_are_the_references(void **state) {
                 ++met;
                 const double point[3] = {x, y, z};
                 double wanted[3], got[3];
-                const double slope = reference_normal(quadrics, terms, point, wanted);
+                const double slope = ov_twin_normal(quadrics, terms, point, wanted);
                 unpack_normal(v.normal[at], got);
                 expect_near(v.extra[at], slope, 1e-3 * slope + 1e-4, "the gradient's length");
                 for (int axis = 0; axis < 2; ++axis)
@@ -234,7 +232,7 @@ static void ellipsoids_are_seen_singly(void **state) {
             const size_t at = ov_rays_index(&v.rays, column, row);
             size_t which = 0;
             const double x = ray_x(&v.rays, column), y = ray_y(&v.rays, row);
-            const double z = reference_hit_single(quadrics, terms, c, x, y, &which);
+            const double z = ov_twin_hit_single(quadrics, terms, c, x, y, &which);
             assert_int_equal(v.depth[at] > OV_NOWHERE, z > -INFINITY);
             if (!(z > -INFINITY))
                 continue;
@@ -244,7 +242,7 @@ static void ellipsoids_are_seen_singly(void **state) {
             const double point[3] = {x, y, z};
             memcpy(&index, &v.extra[at], sizeof index);
             assert_int_equal(index, which);
-            reference_normal(&quadrics[which], 1, point, wanted);
+            ov_twin_normal(&quadrics[which], 1, point, wanted);
             unpack_normal(v.normal[at], normal);
             expect_near(fabs(v.depth[at] - z) * wanted[2], 0.0, 1e-4, "an ellipsoid's depth");
             for (int axis = 0; axis < 2; ++axis)
@@ -286,8 +284,8 @@ static void comparison_is_the_formula(void **state) {
             const double point[3] = {ray_x(&v.rays, column), ray_y(&v.rays, row),
                                      (double)v.depth[at]};
             double normal[3];
-            const double slope = reference_normal(own, terms, point, normal);
-            const double wanted = (reference_sum_at(other, terms, point) - c) / slope;
+            const double slope = ov_twin_normal(own, terms, point, normal);
+            const double wanted = (ov_twin_sum_at(other, terms, point) - c) / slope;
             expect_near(v.extra[at], wanted, 2e-3 * fabs(wanted) + 2e-4, "a distance");
         }
     destroy_view(&v);
@@ -442,8 +440,8 @@ static void quadrics_keep_their_values(void **state) {
         for (int k = 0; k < 3; ++k)
             y[k] = camera.centre[k] + p[0] * camera.axis[0][k] + p[1] * camera.axis[1][k] +
                    p[2] * camera.axis[2][k];
-        const double wanted = reference_sum_at(&quadrics[i], 1, y);
-        expect_near(reference_sum_at(&seen, 1, p), wanted, 1e-10 * wanted + 1e-14, "a value");
+        const double wanted = ov_twin_sum_at(&quadrics[i], 1, y);
+        expect_near(ov_twin_sum_at(&seen, 1, p), wanted, 1e-10 * wanted + 1e-14, "a value");
     }
 }
 
@@ -515,7 +513,7 @@ static void sphere_looks_like_one(void **state) {
         const double colour[3] = {own.rgba[0], own.rgba[1], own.rgba[2]};
         const double fade = lights->fade * (extent - z) / (2.0 * extent);
         double light[3];
-        reference_light(colour, normal, lights->key, lights->fill, lights->ambient, light);
+        ov_twin_light(colour, normal, lights->key, lights->fill, lights->ambient, light);
         for (int k = 0; k < 3; ++k) {
             const double wanted = light[k] + fade * (haze.rgba[k] - light[k]);
             expect_near(pixel_of(image, x, y)[k], ov_srgb_encode(wanted), 1.01, "a colour");

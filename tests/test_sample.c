@@ -15,13 +15,13 @@ typedef struct job {
 
 /* phi may differ from the device's by this much: the cut-off, and positions rounded to float. */
 static double tolerance_at(const job *j, const ov_lattice *lattice, const double y[3], double *phi,
-                           reference_sum gradient[3]) {
+                           ov_twin_sum gradient[3]) {
     double extent = 0.0, slope = 0.0;
     ov_quadric *const quadrics = test_alloc(j->atoms, sizeof *quadrics);
     for (size_t i = 0; i < j->atoms; ++i)
         ov_quadric_of_atom(j->xyzr + 4 * i, j->decay, &quadrics[i]);
-    const reference_sum field = reference_field(quadrics, j->atoms, y);
-    reference_gradient(quadrics, j->atoms, y, gradient);
+    const ov_twin_sum field = ov_twin_field(quadrics, j->atoms, y);
+    ov_twin_gradient(quadrics, j->atoms, y, gradient);
     for (size_t axis = 0; axis < 3; ++axis) {
         extent = fmax(extent, lattice->step[axis] * (double)lattice->size[axis]);
         slope += gradient[axis].scale;
@@ -104,7 +104,7 @@ static size_t expect_samples(ovoid_context *context, const job *j) {
     float *const value = read_floats(context, &samples.value, points->packs * OV_PACK);
     float *const slope = read_floats(context, &samples.gradient, points->packs * 3 * OV_PACK);
     double phi;
-    reference_sum gradient[3];
+    ov_twin_sum gradient[3];
     for (size_t k = 0; k < points->packs * OV_PACK; ++k) {
         const size_t at = k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
         const double *const y = xyz + 3 * k;
@@ -124,7 +124,7 @@ static size_t expect_samples(ovoid_context *context, const job *j) {
     for (size_t index = 0; index < all; ++index) {
         double y[3];
         position(&lattice, index, y);
-        phi = reference_phi(j->xyzr, j->atoms, j->decay, y);
+        phi = ov_twin_phi(j->xyzr, j->atoms, j->decay, y);
         const bool is_wanted = belongs(&j->band, &lattice, index, phi);
         wanted += is_wanted;
         if (is_wanted == kept[index])
@@ -444,13 +444,13 @@ static void samples_of_a_wide_structure(void **state) {
     assert_true(samples.points.count > 300);
     for (size_t k = 0; k < all; ++k) {
         const float *const g = slope + k / OV_PACK * (3 * OV_PACK) + k % OV_PACK;
-        const double phi = reference_phi(xyzr, ALL, 0.5, xyz + 3 * k);
+        const double phi = ov_twin_phi(xyzr, ALL, 0.5, xyz + 3 * k);
         double off = 0.0, length = 0.0;
         for (size_t axis = 0; axis < 3; ++axis) {
             double wanted = 0.0;
             for (size_t i = 0; i < ALL; ++i)
                 wanted -= (xyz[3 * k + axis] - xyzr[4 * i + axis]) *
-                          reference_phi(xyzr + 4 * i, 1, 0.5, xyz + 3 * k);
+                          ov_twin_phi(xyzr + 4 * i, 1, 0.5, xyz + 3 * k);
             off += pow(g[axis * OV_PACK] - wanted, 2.0);
             length += wanted * wanted;
         }
@@ -503,7 +503,7 @@ static void lists_of_samples_need_little_room(void **state) {
     double *const xyz = read_places(context, &samples.points);
     float *const value = read_floats(context, &samples.value, all);
     for (size_t k = 0; k < all; k += 1009) {
-        const double phi = reference_phi(xyzr, MANY, 0.5, xyz + 3 * k);
+        const double phi = ov_twin_phi(xyzr, MANY, 0.5, xyz + 3 * k);
         expect_near(value[k], phi, 3e-6 * phi + 1e-7 * MANY, "phi");
     }
     free(xyz);

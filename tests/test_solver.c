@@ -4,7 +4,7 @@
  */
 #include "fit/adaptive/solver.h"
 #include "model/ellipsoid.h"
-#include "reference/factor.h"
+#include "selftest/twin_factor.h"
 #include "support.h"
 
 enum { P = OV_FACTOR_PARAMETERS, BLOCK = P * (P + 1) / 2 };
@@ -31,8 +31,8 @@ static void twin_is_the_derivative(void **state) {
             x[k] = random_uniform(&random, -1.0, 1.0);
         for (int k = 0; k < 3; ++k)
             y[k] = random_uniform(&random, -1.5, 1.5);
-        reference_jacobian(x, 1, y, row);
-        const double value = reference_factor_value(x, y);
+        ov_twin_jacobian(x, 1, y, row);
+        const double value = ov_twin_factor_value(x, y);
         for (int j = 0; j < P; ++j) {
             double slope[2];
             for (int half = 0; half < 2; ++half) {
@@ -43,7 +43,7 @@ static void twin_is_the_derivative(void **state) {
                 up[j] += h;
                 down[j] -= h;
                 slope[half] =
-                    (reference_factor_value(up, y) - reference_factor_value(down, y)) / (2.0 * h);
+                    (ov_twin_factor_value(up, y) - ov_twin_factor_value(down, y)) / (2.0 * h);
             }
             expect_near(row[j], (4.0 * slope[1] - slope[0]) / 3.0, 1e-7 * (1.0 + 10.0 * value),
                         "a derivative");
@@ -115,7 +115,7 @@ static void make_start(test_random *random, size_t count, start *s) {
     for (size_t i = 0; i < count; ++i) {
         double xyz[3 * POINTS], weight[POINTS];
         ov_quadric quadric;
-        reference_sum sums[OV_GRAM];
+        ov_twin_sum sums[OV_GRAM];
         random_factor(random, 4.0, s->x + i * P);
         for (size_t k = OV_FACTOR_L; k < P; ++k) /* floats, as the kernel sees them */
             s->x[i * P + k] = (float)s->x[i * P + k];
@@ -124,7 +124,7 @@ static void make_start(test_random *random, size_t count, start *s) {
             xyz[k] = quadric.centre[k % 3] + random_uniform(random, -2.0, 2.0);
         for (size_t k = 0; k < POINTS; ++k)
             weight[k] = random_uniform(random, 0.1, 1.0);
-        reference_gram(&quadric, xyz, weight, POINTS, sums);
+        ov_twin_gram(&quadric, xyz, weight, POINTS, sums);
         for (size_t m = 0; m < OV_GRAM; ++m)
             s->gram[i * OV_GRAM + m] = (float)sums[m].value;
         for (size_t m = 0; m < OV_MONOMIALS; ++m) { /* high and low parts, the low not rounding */
@@ -152,9 +152,9 @@ static void maps_equal_twin(void **state) {
     for (size_t i = 0; i < s.count; ++i) {
         double map[OV_MONOMIALS][P], left = 0.0, right = 0.0, parts = 0.0;
         const float *const p = s.p + i * P, *const r = s.r + i * P, *const c = s.polynomial + i * P;
-        reference_factor_map(s.x + i * P, map);
+        ov_twin_factor_map(s.x + i * P, map);
         for (size_t j = 0; j < P; ++j) {
-            reference_sum gradient = {0}, polynomial = {0};
+            ov_twin_sum gradient = {0}, polynomial = {0};
             for (size_t m = 0; m < OV_MONOMIALS; ++m) {
                 const float *const pair = s.moments + 2 * (i * OV_MONOMIALS + m);
                 const double moment = (double)pair[0] + pair[1];
@@ -188,7 +188,7 @@ static void twin_block(const double *x, const float *gram, double lambda, double
         for (int a = degree; a >= 0; --a)
             for (int b = degree - a; b >= 0; --b)
                 sum_of[a][b][degree - a - b] = gram[n++];
-    reference_factor_map(x, map);
+    ov_twin_factor_map(x, map);
     for (int i = 0; i < P; ++i)
         for (int j = 0; j < P; ++j) {
             block[i][j] = 0.0;
@@ -320,9 +320,10 @@ static double error_of(const problem *p, const double *step, double lambda) {
     double *const factored = test_alloc(size * size, sizeof *factored);
     double *const wanted = test_alloc(size, sizeof *wanted);
     double error = 0.0, whole = 0.0;
-    reference_system(p->x, count, p->b.xyz, p->weight, p->u, p->b.count, lambda, matrix, wanted);
+    assert_true(
+        ov_twin_system(p->x, count, p->b.xyz, p->weight, p->u, p->b.count, lambda, matrix, wanted));
     memcpy(factored, matrix, size * size * sizeof *matrix);
-    assert_true(reference_solve(factored, size, wanted));
+    assert_true(ov_twin_solve(factored, size, wanted));
     for (size_t i = 0; i < size; ++i)
         for (size_t j = 0; j < size; ++j) {
             const double entry = matrix[i * size + j];

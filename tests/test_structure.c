@@ -626,6 +626,111 @@ static void crowds_take_no_longer(void **state) {
     free(text);
 }
 
+/* ---- from memory ---------------------------------------------------------------------------- */
+
+/* A molecule of what is known of another one's atoms, but for their radii. */
+static ovoid_status make_known(const ovoid_molecule *molecule, ovoid_radii radii,
+                               ovoid_molecule **known) {
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    size_t residues;
+    double *xyzr = malloc(4 * atoms * sizeof *xyzr);
+    const ovoid_residue *named = ovoid_molecule_residues(molecule, &residues);
+    assert_non_null(xyzr);
+    memcpy(xyzr, ovoid_molecule_xyzr(molecule), 4 * atoms * sizeof *xyzr);
+    for (size_t i = 0; i < atoms; i++)
+        xyzr[4 * i + 3] = 0.0;
+    const ovoid_status status =
+        ovoid_molecule_create_known(context, xyzr, ovoid_molecule_identity(molecule), atoms, named,
+                                    residues, radii, NULL, known);
+    free(xyzr);
+    return status;
+}
+
+static void expect_same_known(const ovoid_molecule *molecule, ovoid_radii radii) {
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    ovoid_molecule *known = NULL;
+    size_t residues, same;
+    assert_int_equal(make_known(molecule, radii, &known), OVOID_OK);
+    const ovoid_residue *there = ovoid_molecule_residues(molecule, &residues);
+    const ovoid_residue *here = ovoid_molecule_residues(known, &same);
+    assert_int_equal(same, residues);
+    assert_memory_equal(here, there, residues * sizeof *there);
+    assert_memory_equal(ovoid_molecule_identity(known), ovoid_molecule_identity(molecule),
+                        atoms * sizeof(ovoid_atom));
+    assert_memory_equal(ovoid_molecule_xyzr(known), ovoid_molecule_xyzr(molecule),
+                        4 * atoms * sizeof(double));
+    assert_int_equal(ovoid_molecule_radii(known), ovoid_molecule_radii(molecule));
+    assert_int_equal(ovoid_molecule_read_counts(known)->guessed_radii,
+                     ovoid_molecule_read_counts(molecule)->guessed_radii);
+    ovoid_molecule_destroy(&known);
+}
+
+/* Atoms from memory that are known by name get the radii that they have in a file. */
+static void known_atoms_are_those_of_a_file(void **state) {
+    (void)state;
+    static const char *const entry = "/usr/share/pymol/data/tut/1hpv.pdb";
+    ovoid_molecule *molecule = expect("a.pdb", pdb, NULL, 5);
+    expect_same_known(molecule, OVOID_RADII_DEFAULT);
+    ovoid_molecule_destroy(&molecule);
+    if (access(entry, R_OK) != 0)
+        skip();
+    for (ovoid_radii radii = OVOID_RADII_BONDI; radii <= OVOID_RADII_UNITED; radii++) {
+        ovoid_read_options options = defaults();
+        options.radii = radii;
+        assert_int_equal(ovoid_molecule_read_with(context, entry, &options, &molecule), OVOID_OK);
+        expect_same_known(molecule, radii);
+        ovoid_molecule_destroy(&molecule);
+    }
+}
+
+static void expect_refused(const ovoid_atom *atoms, size_t count, const ovoid_residue *residues,
+                           size_t residue_count, const char *text) {
+    static const double xyzr[12] = {0.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 1.0, 6.0, 0.0, 0.0, 1.0};
+    ovoid_molecule *molecule = NULL;
+    assert_int_equal(ovoid_molecule_create_known(context, xyzr, atoms, count, residues,
+                                                 residue_count, OVOID_RADII_DEFAULT, NULL,
+                                                 &molecule),
+                     OVOID_ERROR_ARGUMENT);
+    assert_null(molecule);
+    assert_non_null(strstr(ovoid_context_error(context), text));
+}
+
+static void known_atoms_must_follow_their_residues(void **state) {
+    (void)state;
+    const ovoid_residue residues[2] = {{.name = "ALA"}, {.name = "GLY"}};
+    const ovoid_atom back[3] = {{.residue = 0}, {.residue = 1}, {.residue = 0}};
+    const ovoid_atom late[3] = {{.residue = 1}, {.residue = 1}, {.residue = 1}};
+    const ovoid_atom beyond[3] = {{.residue = 0}, {.residue = 1}, {.residue = 2}};
+    expect_refused(back, 3, residues, 2, "atom 2 (from 0) is of residue 0");
+    expect_refused(late, 3, residues, 2, "atom 0 (from 0) is of residue 1");
+    expect_refused(beyond, 3, residues, 2, "atom 2 (from 0) is of residue 2");
+    expect_refused(back, 1, residues, 2, "residue 1 (from 0) has no atom");
+    expect_refused(back, 3, residues, 0, "atom 0 (from 0)");
+}
+
+/* What the caller's arrays hold is as little to be trusted as a file. */
+static void known_names_are_ended(void **state) {
+    (void)state;
+    static const double xyzr[4] = {0.0, 0.0, 0.0, 2.5};
+    ovoid_atom atom = {.residue = 0, .flags = 0xffu};
+    ovoid_residue residue = {.number = 7, .first = 99};
+    ovoid_molecule *molecule = NULL;
+    memcpy(atom.name, "C\033LONGER", sizeof atom.name);
+    memcpy(atom.element, "C", 2);
+    memset(residue.chain, 'X', sizeof residue.chain);
+    assert_int_equal(ovoid_molecule_create_known(context, xyzr, &atom, 1, &residue, 1,
+                                                 OVOID_RADII_OWN, NULL, &molecule),
+                     OVOID_OK);
+    const ovoid_atom *made = ovoid_molecule_identity(molecule);
+    const ovoid_residue *chain = ovoid_molecule_residues(molecule, NULL);
+    assert_string_equal(made->name, "C?LONGE");
+    assert_string_equal(chain->chain, "XXXXXXXXXXX");
+    assert_int_equal(made->flags, OVOID_ATOM_HETERO | OVOID_ATOM_ZERO_OCCUPANCY);
+    assert_int_equal(chain->first, 0);
+    assert_true(ovoid_molecule_xyzr(molecule)[3] == 2.5);
+    ovoid_molecule_destroy(&molecule);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pdb_files_are_read),
@@ -644,6 +749,9 @@ int main(void) {
         cmocka_unit_test(noise_gives_atoms_or_a_message),
         cmocka_unit_test(memory_follows_the_atoms),
         cmocka_unit_test(crowds_take_no_longer),
+        cmocka_unit_test(known_atoms_are_those_of_a_file),
+        cmocka_unit_test(known_atoms_must_follow_their_residues),
+        cmocka_unit_test(known_names_are_ended),
     };
     return cmocka_run_group_tests(tests, begin, finish);
 }

@@ -4,6 +4,8 @@
  */
 #include "scene.h"
 
+#include "fit/adaptive/constants.h"
+
 /* ---- the twin ----------------------------------------------------------------------------- */
 
 typedef enum zone { ZONE_OUTSIDE, ZONE_BAND, ZONE_INSIDE, ZONE_EDGE } zone;
@@ -21,9 +23,9 @@ static zone zone_of(const scene *s, double phi) {
 static double weight_of(const scene *s, const double y[3], double phi) {
     const ov_target_options *const o = &s->target.options;
     const double length = 1.0 / sqrt(2.0 * s->decay), c = s->isovalue;
-    reference_sum g[3];
+    ov_twin_sum g[3];
     double root = 0.0;
-    reference_gradient(s->quadrics, s->count, y, g);
+    ov_twin_gradient(s->quadrics, s->count, y, g);
     const double slope =
         sqrt(g[0].value * g[0].value + g[1].value * g[1].value + g[2].value * g[2].value) * length /
         c;
@@ -62,7 +64,7 @@ static void free_bounds(bounds *b) {
 }
 
 static double phi_of(const scene *s, size_t k) {
-    return reference_field(s->quadrics, s->count, s->xyz + 3 * k).value;
+    return ov_twin_field(s->quadrics, s->count, s->xyz + 3 * k).value;
 }
 
 static void expect_bounds(const scene *s, const bounds *b, size_t k, double scale) {
@@ -309,7 +311,7 @@ static void emphasis_has_a_limit(void **state) {
                ov_target_emphasise(*state, &s.target, both[0].at, sizeof *both, 2, 100.0, 9.0));
     expect_target(&s, 1.0, factor);
     for (size_t k = 0; k < s.all; ++k)
-        factor[k] = OV_EMPHASIS_MAX;
+        factor[k] = (float)ov_tuned.spots_emphasis_max;
     for (int n = 0; n < 2; ++n) {
         test_check(*state,
                    ov_target_emphasise(*state, &s.target, middle.at, sizeof middle, 1, 100.0, 9.0));

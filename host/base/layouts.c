@@ -2,6 +2,7 @@
 #include "ovoid/ovoid.h"
 
 #include <assert.h>
+#include <string.h>
 
 #define PROMISED(type, bytes) static_assert(sizeof(type) == (bytes), #type " has changed")
 #define AT(type, member, offset)                                                                   \
@@ -63,4 +64,33 @@ AT(ovoid_mesh_options, size, 0);
 AT(ovoid_measure_options, size, 0);
 AT(ovoid_measures, size, 0);
 AT(ovoid_export_options, size, 0);
+AT(ovoid_scene, size, 0);
 AT(ovoid_picture_options, size, 0);
+AT(ovoid_check, size, 0);
+AT(ovoid_selftest_options, size, 0);
+AT(ovoid_selftest_result, size, 0);
+
+#define SIZE(type)                                                                                 \
+    { #type, sizeof(type) }
+static const struct {
+    const char *type;
+    size_t size;
+} sizes[] = {SIZE(ovoid_l1_progress),   SIZE(ovoid_adaptive_progress), SIZE(ovoid_progress),
+             SIZE(ovoid_device_info),   SIZE(ovoid_kernel_time),       SIZE(ovoid_export_options),
+             SIZE(ovoid_l1_options),    SIZE(ovoid_adaptive_options),  SIZE(ovoid_fit_options),
+             SIZE(ovoid_l1_result),     SIZE(ovoid_adaptive_result),   SIZE(ovoid_fit_result),
+             SIZE(ovoid_pair),          SIZE(ovoid_measure_options),   SIZE(ovoid_measures),
+             SIZE(ovoid_mesh_options),  SIZE(ovoid_component),         SIZE(ovoid_distances),
+             SIZE(ovoid_ellipsoid),     SIZE(ovoid_read_options),      SIZE(ovoid_molecule_counts),
+             SIZE(ovoid_atom),          SIZE(ovoid_residue),           SIZE(ovoid_guess),
+             SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options),
+             SIZE(ovoid_check),         SIZE(ovoid_selftest_options),  SIZE(ovoid_selftest_result),
+             SIZE(ovoid_scene)};
+#undef SIZE
+
+size_t ovoid_sizeof(const char *type) {
+    for (size_t i = 0; type && i < sizeof sizes / sizeof *sizes; i++)
+        if (strcmp(type, sizes[i].type) == 0)
+            return sizes[i].size;
+    return 0;
+}

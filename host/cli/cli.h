@@ -18,7 +18,7 @@ enum {
     CLI_USAGE = 2,    /* unknown or bad options */
     CLI_INPUT = 3,    /* an input cannot be read or makes no sense */
     CLI_OUTPUT = 4,   /* an output cannot be written */
-    CLI_DEVICE = 5,   /* no OpenCL device, or none that matches */
+    CLI_DEVICE = 5,   /* no OpenCL device, none that matches, or one that computes wrongly */
     CLI_COMPUTE = 6,  /* out of memory, over a limit, or numbers that are not finite */
     CLI_GOAL = 7,     /* all went well, but what a fit reached is not what was asked */
     CLI_SOME = 8,     /* of several inputs some failed */
@@ -60,9 +60,9 @@ int cli_failure(const ovoid_context *context, ovoid_status status, int io);
 
 /* The options that all who compute have. */
 #define CLI_HELP_RUNNING                                                                           \
-    "  --device SELECTOR   number, type (cpu, gpu) or part of the name of a device that\n"         \
-    "                      'ovoid devices' lists (default: OVOID_DEVICE, else the first GPU,\n"    \
-    "                      else the first device)\n"                                               \
+    "  --device SELECTOR   number, type (cpu, gpu), PCI address, UUID or part of the name of a\n"  \
+    "                      device that 'ovoid devices' lists (default: OVOID_DEVICE, else the\n"   \
+    "                      first GPU, else the first device)\n"                                    \
     "  -q, --quiet         print errors only\n"                                                    \
     "  -h, --help          show this help\n"
 
@@ -212,6 +212,7 @@ int cli_mesh(int argc, char **argv);
 int cli_measure(int argc, char **argv);
 int cli_render(int argc, char **argv);
 int cli_devices(int argc, char **argv);
+int cli_selftest(int argc, char **argv);
 int cli_export(int argc, char **argv);
 
 void cli_fit_help(FILE *stream);
@@ -219,6 +220,7 @@ void cli_mesh_help(FILE *stream);
 void cli_measure_help(FILE *stream);
 void cli_render_help(FILE *stream);
 void cli_devices_help(FILE *stream);
+void cli_selftest_help(FILE *stream);
 void cli_export_help(FILE *stream);
 
 #endif

@@ -6,25 +6,27 @@
 enum { NONE = -1 };
 
 void cli_devices_help(FILE *stream) {
-    fputs("Usage: ovoid devices [--json]\n"
-          "\n"
-          "Lists the OpenCL devices of all platforms, one line each. A star marks the one that\n"
-          "is used when nothing else is said: OVOID_DEVICE, else the first GPU, else the first\n"
-          "device.\n"
-          "\n"
-          "Options:\n"
-          "  --json      print JSON for other programs, with more about each device\n"
-          "  -h, --help  show this help\n"
-          "\n"
-          "Columns:\n"
-          "  #         what --device and OVOID_DEVICE take; so are the type, or part of the name\n"
-          "  type      cpu, gpu, accelerator or other\n"
-          "  units     compute units: cores of a CPU, multiprocessors of a GPU\n"
-          "  memory    memory of the device as its driver reports it\n"
-          "  width     floats that one vector instruction handles best\n"
-          "  fp64      double precision in kernels; Ovoid does not need it\n"
-          "\n",
-          stream);
+    fputs(
+        "Usage: ovoid devices [--json]\n"
+        "\n"
+        "Lists the OpenCL devices of all platforms, one line each. A star marks the one that\n"
+        "is used when nothing else is said: OVOID_DEVICE, else the first GPU, else the first\n"
+        "device.\n"
+        "\n"
+        "Options:\n"
+        "  --json      print JSON for other programs, with more about each device\n"
+        "  -h, --help  show this help\n"
+        "\n"
+        "Columns:\n"
+        "  #         what --device and OVOID_DEVICE take; so are the type, part of the name, and\n"
+        "            the PCI address or UUID that --json shows where the driver tells them\n"
+        "  type      cpu, gpu, accelerator or other\n"
+        "  units     compute units: cores of a CPU, multiprocessors of a GPU\n"
+        "  memory    memory of the device as its driver reports it\n"
+        "  width     floats that one vector instruction handles best\n"
+        "  fp64      double precision in kernels; Ovoid does not need it\n"
+        "\n",
+        stream);
     cli_print_environment(stream);
     putc('\n', stream);
     cli_print_exit_codes(stream);
@@ -127,7 +129,10 @@ static bool add_device(cJSON *array, const ovoid_device_info *device, bool chose
            cJSON_AddNumberToObject(json, "float_width", device->float_width) &&
            cJSON_AddBoolToObject(json, "fp64", device->fp64) &&
            cJSON_AddNumberToObject(json, "global_memory", (double)device->global_memory) &&
-           cJSON_AddNumberToObject(json, "max_allocation", (double)device->max_allocation);
+           cJSON_AddNumberToObject(json, "max_allocation", (double)device->max_allocation) &&
+           cJSON_AddNumberToObject(json, "local_memory", (double)device->local_memory) &&
+           cJSON_AddNumberToObject(json, "max_group", (double)device->max_group) &&
+           cli_json_string(json, "pci", device->pci) && cli_json_string(json, "uuid", device->uuid);
 }
 
 static int print_json(ovoid_context *context, const ovoid_device_info *devices, size_t count,

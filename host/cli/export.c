@@ -5,7 +5,7 @@
 #include <string.h>
 
 typedef struct export_numbers {
-    double decay;
+    double decay; /* 0: the model's, or the default */
     ovoid_export_options options;
 } export_numbers;
 
@@ -17,11 +17,18 @@ static const cli_number numbers[] = {
          "ellipsoids are drawn where their own Gaussian has this value, and maps reach to a "
          "hundredth of it; 0 takes the model's, or 1 for a molecule"),
     REAL("opacity", options.opacity, 0, false, 1, "", "of drawn ellipsoids, 0 to 1"),
-    REAL("spacing", options.spacing, 0, true, 1e3, "Å", "of a map's points"),
+    REAL("spacing", options.spacing, 0, true, 1e3, "Å",
+         "of a map's points, and of the lattice on which surfaces are meshed"),
     REAL("max-gigabytes", options.max_gigabytes, 0, true, 1e6, "GB",
          "a map that would take more is refused"),
+    REAL("range", options.range, 0, false, 1e6, "Å",
+         "distance at which the colours of a difference end; 0 stands for what 99 % of the surface "
+         "stays within"),
+    REAL("max-triangles", options.max_triangles, 1, false, 1e9, "",
+         "of a surface in a page: where it would have more, the spacing becomes larger"),
     REAL("decay", decay, 0, true, 100, "Å⁻²",
-         "decay rate d of the atoms' Gaussians, for a molecule"),
+         "decay rate d of the atoms' Gaussians, for a molecule; with a model, its own value is the "
+         "default"),
 };
 enum { NUMBER_COUNT = sizeof numbers / sizeof *numbers };
 
@@ -41,44 +48,92 @@ static const struct option named[] = {
 enum { NAMED_COUNT = sizeof named / sizeof *named };
 
 typedef struct export_job {
-    const char *input;
+    char **inputs; /* a molecule or none, and then models */
+    size_t input_count;
     const char *output;
     const char *device; /* NULL: the default */
     bool quiet;
     reading reading;
     export_numbers numbers;
     ovoid_context *context;
-    source source;
+    ovoid_molecule *molecule; /* NULL: none */
+    ovoid_model **models;     /* owned, room for input_count */
+    size_t model_count;
 } export_job;
+
+/* Formats by their names, in the order of ovoid_export_format, with this between them. */
+static void list_formats(char *text, size_t size, const char *between, const char *last) {
+    const char *name;
+    size_t used = 0;
+    text[0] = '\0';
+    for (int i = OVOID_EXPORT_AUTO + 1; (name = ovoid_export_format_name(i)) != NULL; i++) {
+        const bool end = ovoid_export_format_name(i + 1) == NULL;
+        used += (size_t)snprintf(text + used, used < size ? size - used : 0, "%s%s",
+                                 used == 0 ? ""
+                                 : end     ? last
+                                           : between,
+                                 name);
+    }
+}
+
+/* Formats of what is computed on the device. */
+static bool needs_device(ovoid_export_format format) {
+    return format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX || format == OVOID_EXPORT_HTML;
+}
+
+/* Models that a format takes beside a molecule; 0: it takes one input alone. */
+static size_t models_beside(ovoid_export_format format) {
+    return format == OVOID_EXPORT_HTML ? SIZE_MAX - 1 : format == OVOID_EXPORT_IHM;
+}
 
 void cli_export_help(FILE *stream) {
     export_numbers defaults = {.decay = OVOID_DEFAULT_DECAY};
+    char formats[256];
     ovoid_export_options_init(&defaults.options, sizeof defaults.options);
-    fputs("Usage: ovoid export INPUT -o FILE [OPTION]...\n"
-          "\n"
-          "Writes a model for another program, or the field of a model or a molecule as a density\n"
-          "map. INPUT is a model as 'ovoid fit' writes it, or for maps also a molecule (PDB,\n"
-          "mmCIF, PQR or XYZR); - is standard input, and a model unless --format says otherwise.\n"
-          "\n"
-          "The extension of FILE says what is written:\n"
-          "  .bild .bld        ellipsoids for ChimeraX, in one object (as bild)\n"
-          "  .cxc              ellipsoids for ChimeraX, smoother, each of its own (as cxc)\n"
-          "  .py               ellipsoids for PyMOL, a script to run in it (as pymol)\n"
-          "  .gmm              the Gaussian mixture of gmconvert and gmfit (as gmm)\n"
-          "  .json             the model with axes and semi-axes, for scripts (as json)\n"
-          "  .mrc .map .ccp4   density map, MRC2014, 32-bit floats (as ccp4)\n"
-          "  .dx               density map, OpenDX text as APBS writes it (as dx)\n"
-          "\n"
-          "Files:\n"
-          "  -o, --output FILE   where it goes, - for standard output\n"
-          "  --as bild|cxc|pymol|gmm|json|ccp4|dx\n"
-          "                      what to write when the extension does not say; where it says\n"
-          "                      something else, nothing is written\n",
-          stream);
+    list_formats(formats, sizeof formats, "|", "|");
+    fputs(
+        "Usage: ovoid export INPUT -o FILE [OPTION]...\n"
+        "       ovoid export MOLECULE MODEL... -o FILE [OPTION]...\n"
+        "\n"
+        "Writes a model for another program, the field of a model or a molecule as a density\n"
+        "map, or both as a page for a browser. INPUT is a model as 'ovoid fit' writes it, or for\n"
+        "maps and pages also a molecule (PDB, mmCIF, PQR or XYZR); - is standard input, and a\n"
+        "model unless --format says otherwise. Several models are levels of detail of the same\n"
+        "molecule, the finest first.\n"
+        "\n"
+        "The extension of FILE says what is written:\n"
+        "  .bild .bld        ellipsoids for ChimeraX, in one object (as bild)\n"
+        "  .cxc              ellipsoids for ChimeraX, smoother, each of its own (as cxc)\n"
+        "  .py               ellipsoids for PyMOL, a script to run in it (as pymol)\n"
+        "  .gmm              the Gaussian mixture of gmconvert and gmfit (as gmm)\n"
+        "  .json             the model with axes and semi-axes, for scripts (as json)\n"
+        "  .xyz .extxyz      ellipsoids for OVITO, extended XYZ with semi-axes and orientations "
+        "(as\n"
+        "                    xyz)\n"
+        "  .lmp .data        ellipsoids for LAMMPS, data of atom style ellipsoid (as lammps)\n"
+        "  .pdb .ent         ellipsoids as pseudo-atoms with ANISOU, for Mol*, ChimeraX and PyMOL\n"
+        "                    (as anisou)\n"
+        "  .gltf             Gaussian splats, glTF with KHR_gaussian_splatting (as splat)\n"
+        "  .cif .mmcif       Gaussians in IHMCIF, the PDB's format of integrative models; with\n"
+        "                    MOLECULE and MODEL each says what residues it stands for (as ihm)\n"
+        "  .mrc .map .ccp4   density map, MRC2014, 32-bit floats (as ccp4)\n"
+        "  .dx               density map, OpenDX text as APBS writes it (as dx)\n"
+        "  .html .htm        a page for a browser, in which the surfaces of molecule and model,\n"
+        "                    their difference and the ellipsoids can be turned; one file without\n"
+        "                    network access (as html)\n"
+        "\n"
+        "Files:\n"
+        "  -o, --output FILE   where it goes, - for standard output\n",
+        stream);
+    fprintf(stream,
+            "  --as %s\n"
+            "                      what to write when the extension does not say; where it says\n"
+            "                      something else, nothing is written\n",
+            formats);
     reading_help(stream, true);
     fputs("\n"
           "Running:\n"
-          "  --device SELECTOR   the device that computes maps, see 'ovoid devices'\n"
+          "  --device SELECTOR   the device that computes maps and surfaces, see 'ovoid devices'\n"
           "  -q, --quiet         print errors only\n"
           "  -h, --help          show this help\n"
           "\n"
@@ -97,6 +152,7 @@ void cli_export_help(FILE *stream) {
         "  ovoid export model.ovoid -o model.cxc                 then open it in ChimeraX\n"
         "  ovoid export model.ovoid -o model.py --opacity 0.5    then run it in PyMOL\n"
         "  ovoid export molecule.pqr -o field.mrc --spacing 0.4\n"
+        "  ovoid export molecule.pqr model.ovoid -o view.html    then open it in a browser\n"
         "  ovoid export model.ovoid -o - --as json | jq .ellipsoids[0]\n"
         "\n",
         lround(255.0 * defaults.options.colour[0]), lround(255.0 * defaults.options.colour[1]),
@@ -108,10 +164,16 @@ void cli_export_help(FILE *stream) {
 
 /* ---- options ------------------------------------------------------------------------------ */
 
+static void say_formats(const char *text) {
+    char formats[256];
+    list_formats(formats, sizeof formats, ", ", " or ");
+    cli_error("--as takes %s, not '%s'", formats, text);
+}
+
 static bool parse_as(const char *text, ovoid_export_format *format) {
     *format = ovoid_export_format_find(text);
     if (*format == OVOID_EXPORT_AUTO)
-        cli_error("--as takes bild, cxc, pymol, gmm, json, ccp4 or dx, not '%s'", text);
+        say_formats(text);
     return *format != OVOID_EXPORT_AUTO;
 }
 
@@ -127,28 +189,49 @@ static bool parse_colour(const char *text, double colour[3]) {
     return true;
 }
 
+static ovoid_export_format format_of(const export_job *job) {
+    if (job->numbers.options.format != OVOID_EXPORT_AUTO)
+        return job->numbers.options.format;
+    const char *dot = strrchr(job->output, '.');
+    return dot ? ovoid_export_format_find(dot) : OVOID_EXPORT_AUTO;
+}
+
+static bool check_inputs(const export_job *job) {
+    size_t streams = 0;
+    for (size_t i = 0; i < job->input_count; i++) {
+        const bool stream = strcmp(job->inputs[i], "-") == 0;
+        streams += stream;
+        if (!stream && cli_same_file(job->inputs[i], job->output)) {
+            cli_error("the input and the output (-o) are the same file '%s'", job->output);
+            return false;
+        }
+    }
+    if (streams > 1)
+        cli_error("only one input can come from standard input");
+    return streams <= 1;
+}
+
 static bool complete(int argc, char **argv, export_job *job) {
     if (optind == argc) {
         cli_error("which model? Name its file: ovoid export INPUT -o FILE "
                   "(see 'ovoid export --help')");
         return false;
     }
-    if (optind + 1 < argc) {
-        cli_error("one input at a time, but '%s' follows '%s' (see 'ovoid export --help')",
-                  argv[optind + 1], argv[optind]);
-        return false;
-    }
-    job->input = argv[optind];
     if (!job->output) {
         cli_error("where to? Name the file with -o, its extension says what is written "
                   "(see 'ovoid export --help')");
         return false;
     }
-    if (strcmp(job->input, "-") != 0 && cli_same_file(job->input, job->output)) {
-        cli_error("the input and the output (-o) are the same file '%s'", job->output);
+    job->inputs = argv + optind;
+    job->input_count = (size_t)(argc - optind);
+    const size_t beside = models_beside(format_of(job));
+    if (job->input_count > 1 + beside) {
+        cli_error("%s at a time, but '%s' follows '%s' (see 'ovoid export --help')",
+                  beside ? "a molecule and one model" : "one input", job->inputs[1 + beside],
+                  job->inputs[beside]);
         return false;
     }
-    return true;
+    return check_inputs(job);
 }
 
 static bool parse_option(int option, export_job *job) {
@@ -180,7 +263,6 @@ static bool parse(int argc, char **argv, export_job *job, int *code) {
     int option;
     memcpy(all, named, sizeof named);
     cli_number_options(numbers, NUMBER_COUNT, NUMBERS, all + NAMED_COUNT);
-    job->numbers.decay = OVOID_DEFAULT_DECAY;
     ovoid_export_options_init(&job->numbers.options, sizeof job->numbers.options);
     reading_init(&job->reading, true);
     opterr = 0;
@@ -204,48 +286,63 @@ static bool parse(int argc, char **argv, export_job *job, int *code) {
 
 /* ---- work --------------------------------------------------------------------------------- */
 
-static ovoid_export_format format_of(const export_job *job) {
-    if (job->numbers.options.format != OVOID_EXPORT_AUTO)
-        return job->numbers.options.format;
-    const char *dot = strrchr(job->output, '.');
-    return dot ? ovoid_export_format_find(dot) : OVOID_EXPORT_AUTO;
-}
-
 static void print_summary(const export_job *job) {
     if (job->quiet || strcmp(job->output, "-") == 0)
         return;
     cli_progress_erase();
-    const char *from = source_name(job->input);
-    const char *name = ovoid_export_format_name(format_of(job));
-    if (job->source.model)
-        printf("%s: %zu ellipsoids, written to %s as %s\n", from,
-               ovoid_model_size(job->source.model), job->output, name);
-    else
-        printf("%s: %zu atoms, written to %s as %s\n", from,
-               ovoid_molecule_atoms(job->source.molecule), job->output, name);
+    printf("%s: ", source_name(job->inputs[0]));
+    if (job->molecule)
+        printf("%zu atoms, ", ovoid_molecule_atoms(job->molecule));
+    for (size_t i = 0; i < job->model_count; i++)
+        printf("%s%zu%s", i ? " / " : "", ovoid_model_size(job->models[i]),
+               i + 1 == job->model_count ? " ellipsoids, " : "");
+    printf("written to %s as %s\n", job->output, ovoid_export_format_name(format_of(job)));
+}
+
+/* The first input may be a molecule, the others are models. */
+static ovoid_status read_inputs(export_job *job) {
+    ovoid_status status = OVOID_OK;
+    const size_t first = reading_is_model(&job->reading, job->inputs[0]) ? 0 : 1;
+    job->models = calloc(job->input_count, sizeof *job->models);
+    if (!job->models)
+        return OVOID_ERROR_MEMORY;
+    if (first == 1)
+        status = reading_molecule(&job->reading, job->context, job->inputs[0], &job->molecule);
+    for (size_t i = first; i < job->input_count && status == OVOID_OK; i++) {
+        status = ovoid_model_read(job->context, job->inputs[i], &job->models[job->model_count]);
+        job->model_count += status == OVOID_OK;
+    }
+    return status;
+}
+
+static ovoid_status write_output(export_job *job) {
+    ovoid_scene scene;
+    ovoid_scene_init(&scene, sizeof scene);
+    scene.molecule = job->molecule;
+    scene.models = (const ovoid_model *const *)job->models;
+    scene.model_count = job->model_count;
+    scene.decay = job->numbers.decay;
+    if (strcmp(job->inputs[0], "-") != 0)
+        scene.title =
+            strrchr(job->inputs[0], '/') ? strrchr(job->inputs[0], '/') + 1 : job->inputs[0];
+    return ovoid_scene_export(job->context, &scene, job->output, &job->numbers.options);
 }
 
 static int run(export_job *job) {
-    ovoid_export_options *options = &job->numbers.options;
-    ovoid_export_format format = format_of(job);
     if (reading_lists(&job->reading))
-        return reading_list(&job->reading, job->context, job->input);
+        return reading_list(&job->reading, job->context, job->inputs[0]);
     ovoid_status status = ovoid_file_check(job->context, job->output);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
-    if ((status = source_read(job->context, job->input, &job->reading, &job->source)) != OVOID_OK)
+    if ((status = read_inputs(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
-    if (job->source.model && !reading_check_model(&job->reading, job->input))
+    if (!job->molecule && !reading_check_model(&job->reading, job->inputs[0]))
         return CLI_USAGE;
-    if (format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX)
+    if (needs_device(format_of(job)))
         status = ovoid_context_open_device(job->context, job->device);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
-    status = source_field(job->context, &job->source, job->numbers.decay, OVOID_DEFAULT_ISOVALUE);
-    if (status != OVOID_OK)
-        return cli_failure(job->context, status, CLI_INPUT);
-    status = ovoid_field_export(job->context, job->source.field, job->output, options);
-    if (status != OVOID_OK)
+    if ((status = write_output(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     print_summary(job);
     return CLI_OK;
@@ -258,7 +355,10 @@ int cli_export(int argc, char **argv) {
         if (cli_context(&job.quiet, &job.context, &code))
             code = run(&job);
     }
-    source_destroy(&job.source);
+    ovoid_molecule_destroy(&job.molecule);
+    for (size_t i = 0; i < job.model_count; i++)
+        ovoid_model_destroy(&job.models[i]);
+    free(job.models);
     ovoid_context_destroy(&job.context);
     return code;
 }

@@ -26,6 +26,7 @@ static const subcommand subcommands[] = {
     {"export", "write a model or a field for another program", cli_export, cli_export_help},
     {"render", "take a picture of a molecule's and a model's surface", cli_render, cli_render_help},
     {"devices", "list the OpenCL devices", cli_devices, cli_devices_help},
+    {"selftest", "test whether a device computes rightly", cli_selftest, cli_selftest_help},
 };
 enum { SUBCOMMANDS = sizeof subcommands / sizeof subcommands[0] };
 
@@ -167,7 +168,7 @@ void cli_print_exit_codes(FILE *stream) {
           "  2    wrong options\n"
           "  3    the input cannot be read, is malformed or empty\n"
           "  4    an output cannot be written\n"
-          "  5    no OpenCL device, or none that matches\n"
+          "  5    no OpenCL device, none that matches, or one that computes wrongly\n"
           "  6    out of memory, over a limit, or numbers that are not finite\n"
           "  7    a fit did not reach its goal: the best model it found is written\n"
           "  8    of several molecules some were fitted and some failed\n"
@@ -178,13 +179,17 @@ void cli_print_exit_codes(FILE *stream) {
 }
 
 void cli_print_environment(FILE *stream) {
-    fputs("Environment:\n"
-          "  OVOID_DEVICE     the device to use when --device is not given\n"
-          "  OVOID_CACHE      whether compiled kernels are kept: auto (unless the driver does so\n"
-          "                   itself; the default), on or off\n"
-          "  OVOID_CACHE_DIR  where they are kept, instead of $XDG_CACHE_HOME/ovoid or\n"
-          "                   ~/.cache/ovoid\n",
-          stream);
+    fputs(
+        "Environment:\n"
+        "  OVOID_DEVICE     the device to use when --device is not given\n"
+        "  OVOID_CACHE      whether compiled kernels are kept: auto (unless the driver does so\n"
+        "                   itself; the default), on or off\n"
+        "  OVOID_CACHE_DIR  where they are kept, instead of $XDG_CACHE_HOME/ovoid or\n"
+        "                   ~/.cache/ovoid\n"
+        "  OVOID_SELFTEST   whether the first use of a device with a driver tests it: auto (once,\n"
+        "                   which is remembered where compiled kernels are kept; the default),\n"
+        "                   on (in every run) or off\n",
+        stream);
 }
 
 static void print_help(FILE *stream) {

@@ -11,8 +11,7 @@
 #define HEADER_FORMAT "ovoid program 1 %016" PRIx64 " %016" PRIx64 " %016" PRIx64 "\n"
 #define HEADER_LENGTH 67
 
-/* FNV-1a, 64 bits (Fowler, Noll, Vo). */
-static uint64_t hash(const void *bytes, size_t count) {
+uint64_t ov_hash(const void *bytes, size_t count) {
     const unsigned char *byte = bytes;
     uint64_t value = 0xcbf29ce484222325u;
     for (size_t i = 0; i < count; i++)
@@ -23,7 +22,7 @@ static uint64_t hash(const void *bytes, size_t count) {
 static void make_header(char header[HEADER_LENGTH + 1], const ov_text *key, const void *binary,
                         size_t bytes) {
     snprintf(header, HEADER_LENGTH + 1, HEADER_FORMAT, (uint64_t)key->length, (uint64_t)bytes,
-             hash(binary, bytes));
+             ov_hash(binary, bytes));
 }
 
 /* ---- whether and where -------------------------------------------------------------------- */
@@ -32,7 +31,7 @@ static void make_header(char header[HEADER_LENGTH + 1], const ov_text *key, cons
  */
 static bool driver_caches(const ov_device *device) {
     return strcmp(device->info.platform, OV_POCL_PLATFORM) == 0 ||
-           strcmp(device->info.platform, "Oclgrind") == 0;
+           strcmp(device->info.platform, OV_OCLGRIND_PLATFORM) == 0;
 }
 
 static void tell_once(ovoid_context *context, ov_device *device, const char *text,
@@ -71,7 +70,7 @@ static bool folder(ov_text *path) {
 
 static bool append_name(ov_text *path, const char *program, const ov_text *key) {
     return ov_text_print(NULL, path, "/%s-%016" PRIx64 ".bin", program,
-                         hash(key->text, key->length)) == OVOID_OK;
+                         ov_hash(key->text, key->length)) == OVOID_OK;
 }
 
 /* ---- reading ------------------------------------------------------------------------------ */
@@ -123,7 +122,7 @@ static bool write_all(int descriptor, const ov_text *key, const unsigned char *b
 
 void ov_cache_write(ovoid_context *context, ov_device *device, const char *program,
                     const ov_text *key, const unsigned char *binary, size_t bytes) {
-    static const char complaint[] = "compiled programs are not kept for the next run: ";
+    static const char complaint[] = "what was compiled and tested is not kept for the next run: ";
     ov_text path = {0}, temporary = {0};
     if (!folder(&path)) {
         tell_once(context, device, complaint, "neither OVOID_CACHE_DIR nor HOME is set", "");

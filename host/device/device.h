@@ -34,6 +34,11 @@ typedef struct ov_shape {
  * - OVOID_POOL: off creates buffers as large as asked for, and releases them at once, for
  * simulators that look for accesses beyond a buffer's end. */
 
+/* - OVOID_SELFTEST: auto (default), on or off: whether the first use of a device tests it; on does
+ *   so in every process, and simulators too. */
+
+#define OV_SELFTEST_TEXT 256 /* bytes of what is wrong with a device */
+
 typedef struct ov_pool ov_pool; /* buffers kept for the next that need one (pool.c) */
 
 typedef struct ov_device {
@@ -51,13 +56,20 @@ typedef struct ov_device {
     struct ov_program *programs;   /* built so far, a list */
     struct ov_made *made;          /* kernels made so far, a list */
     ov_pool *pool;
-    uint32_t built;             /* programs compiled from source so far */
-    uint32_t loaded;            /* programs taken from the cache so far */
-    bool cache_told;            /* the user knows that the cache does not work */
-    struct ov_profile *profile; /* times of kernels; NULL until ovoid_context_profile() */
-    unsigned char *staged;      /* copies of small writes under way; NULL before the first */
+    uint32_t built;                  /* programs compiled from source so far */
+    uint32_t loaded;                 /* programs taken from the cache so far */
+    bool cache_told;                 /* the user knows that the cache does not work */
+    bool trusted;                    /* its self-test is passed, or not wanted (trust.c) */
+    char distrust[OV_SELFTEST_TEXT]; /* what it computes wrongly, "" as far as is known */
+    struct ov_profile *profile;      /* times of kernels; NULL until ovoid_context_profile() */
+    unsigned char *staged;           /* copies of small writes under way; NULL before the first */
     size_t staged_bytes;
 } ov_device;
+
+/* The short form of the self-test on the context's device: text gets what is wrong, or "". *whole:
+ * no call failed. OVOID_ERROR_CANCELLED alone fails it. The checks need all that works on devices,
+ * so this is of a room above, selftest, where it is bound when the library is linked. */
+ovoid_status ov_selftest_brief(ovoid_context *context, char text[OV_SELFTEST_TEXT], bool *whole);
 
 /* The context's device, opening the default one if none is open yet. */
 ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
@@ -79,7 +91,9 @@ typedef struct ov_kernel {
     size_t arg_count;
 } ov_kernel;
 
-/* Makes the kernel `name` of kernels/<program>.cl, building that program on the first request (from
+/* The first kernel of a device may take its self-test: OVOID_ERROR_DEVICE if that finds an error.
+ *
+ * Makes the kernel `name` of kernels/<program>.cl, building that program on the first request (from
  * the embedded source, or from the folder OVOID_KERNEL_DIR when that is set) and keeping it with
  * the device. On PoCL all embedded files are built as one program: no two kernels, functions or
  * macros of theirs may share a name. Build options: -cl-std=CL1.2, the shape, -DOV_PACK, and never

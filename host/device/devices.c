@@ -71,6 +71,11 @@ static uint64_t device_ulong(cl_device_id id, cl_device_info what) {
     return clGetDeviceInfo(id, what, sizeof value, &value, NULL) == CL_SUCCESS ? value : 0;
 }
 
+static uint64_t device_size(cl_device_id id, cl_device_info what) {
+    size_t value = 0;
+    return clGetDeviceInfo(id, what, sizeof value, &value, NULL) == CL_SUCCESS ? value : 0;
+}
+
 static ovoid_device_type type_of(cl_device_type type) {
     if (type & CL_DEVICE_TYPE_CPU) /* first: a simulator that is everything runs on the CPU */
         return OVOID_DEVICE_CPU;
@@ -123,6 +128,9 @@ static cl_int describe(ov_device_entry *entry) {
     info->fp64 = device_ulong(id, CL_DEVICE_DOUBLE_FP_CONFIG) != 0;
     info->global_memory = device_ulong(id, CL_DEVICE_GLOBAL_MEM_SIZE);
     info->max_allocation = device_ulong(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE);
+    info->local_memory = device_ulong(id, CL_DEVICE_LOCAL_MEM_SIZE);
+    info->max_group = device_size(id, CL_DEVICE_MAX_WORK_GROUP_SIZE);
+    ov_device_identify(id, info);
     return find_defect(entry);
 }
 
@@ -154,6 +162,8 @@ ovoid_status ov_device_describe(ovoid_context *context, cl_device_id id, ov_devi
         call = "clGetPlatformInfo";
         code = platform_text(made.platform, CL_PLATFORM_NAME, made.info.platform,
                              sizeof made.info.platform);
+        platform_text(made.platform, CL_PLATFORM_VERSION, made.info.platform_version,
+                      sizeof made.info.platform_version);
     }
     if (code != CL_SUCCESS)
         return ov_cl_fail_on(context, code, call, NULL, NULL);
@@ -189,6 +199,8 @@ static ovoid_status add_device(ovoid_context *context, list *all, cl_platform_id
         return status;
     entry.info.index = (uint32_t)all->count;
     snprintf(entry.info.platform, sizeof entry.info.platform, "%s", platform_name);
+    platform_text(platform, CL_PLATFORM_VERSION, entry.info.platform_version,
+                  sizeof entry.info.platform_version);
     all->entries[all->count++] = entry;
     return OVOID_OK;
 }
@@ -270,6 +282,7 @@ ovoid_status ovoid_devices(ovoid_context *context, size_t size, ovoid_device_inf
     ov_device_entry *entries = NULL;
     char *infos = NULL;
     size_t found = 0, platforms = 0;
+    char hint[OV_VENDORS_TEXT];
     OV_NEED(context, context);
     OV_NEED(context, devices);
     OV_NEED(context, count);
@@ -284,6 +297,8 @@ ovoid_status ovoid_devices(ovoid_context *context, size_t size, ovoid_device_inf
         for (size_t i = 0; i < found; i++)
             ov_sized_init(infos + i * size, size, &entries[i].info, sizeof entries[i].info);
     }
+    if (context->warn && ov_vendors_hint(entries, found, hint))
+        ov_warn(context, "%s", hint);
     *devices = (ovoid_device_info *)(void *)infos;
     *count = found;
 cleanup:

@@ -71,6 +71,15 @@ ovoid_status ov_devices_list(ovoid_context *context, ov_device_entry **entries, 
 /* Describes a device that the caller has found; its index is UINT32_MAX. */
 ovoid_status ov_device_describe(ovoid_context *context, cl_device_id id, ov_device_entry *entry);
 
+/* The device that the selector names, or OVOID_DEVICE, or the default one: see
+ * ovoid_context_open_device(). */
+ovoid_status ov_device_choose(ovoid_context *context, const char *selector,
+                              const ov_device_entry *entries, size_t count, size_t platforms,
+                              const ov_device_entry **chosen);
+
+/* Fills in pci and uuid, which drivers tell in ways of their own, or leave them empty. */
+void ov_device_identify(cl_device_id id, ovoid_device_info *info);
+
 /* What a caller hands over with a device. */
 typedef struct ov_handles {
     cl_context context;
@@ -85,6 +94,7 @@ ovoid_status ov_device_open(ovoid_context *context, const ov_device_entry *entry
 const char *ov_device_type_name(ovoid_device_type type);
 
 #define OV_POCL_PLATFORM "Portable Computing Language"
+#define OV_OCLGRIND_PLATFORM "Oclgrind"
 
 /* PoCL 3.1 finds no device when it cannot write its own cache folder, ends the process when it
  * cannot run what it has compiled there or when the disk is full, and aborts when POCL_CACHE_DIR is
@@ -108,6 +118,20 @@ bool ov_private_folder(const char *base, char *path, size_t size);
 
 /* Creates a folder and those above it, mode 0700 each. False with errno when that fails. */
 bool ov_make_folders(const char *path);
+
+/* ---- trust -------------------------------------------------------------------------------- */
+
+/* At a device's first kernel: the short self-test, unless it is remembered that this device, driver
+ * and library passed it, or OVOID_SELFTEST=off. OVOID_ERROR_DEVICE where it finds an error, now and
+ * whenever asked again. */
+ovoid_status ov_device_trust(ovoid_context *context, ov_device *device);
+
+/* ---- drivers without a vendors file ------------------------------------------------------- */
+
+/* A line about a GPU's driver that is installed, while none of `count` devices is its platform's:
+ * what to write where, or where to look. False, and text "", where there is nothing to say. */
+#define OV_VENDORS_TEXT 1024
+bool ov_vendors_hint(const ov_device_entry *entries, size_t count, char text[OV_VENDORS_TEXT]);
 
 /* ---- pool --------------------------------------------------------------------------------- */
 
@@ -171,15 +195,29 @@ typedef struct ov_source {
     const char *text;
 } ov_source;
 
-/* The embedded kernel sources, ended by a NULL name; made by cmake/EmbedKernels.cmake. */
+/* The embedded kernel sources, ended by a NULL name; made by cmake/EmbedTexts.cmake. */
 extern const ov_source ov_sources[];
+
+/* Options of every build of the device's programs. */
+#define OV_OPTIONS_SIZE 160
+void ov_program_options(const ov_device *device, char options[OV_OPTIONS_SIZE]);
+
+/* Appends platform, device and driver, names and versions, each with its null byte. Fails where a
+ * driver does not tell. */
+ovoid_status ov_device_key(const ov_device *device, ov_text *key);
+
+/* Appends the sources of all kernels. */
+ovoid_status ov_whole_source(ov_text *text);
 
 /* Releases all programs of the device, and their kernels. */
 void ov_programs_release(ov_device *device);
 
-/* The cache of compiled programs: one file <program>-<hash of key>.bin each, which holds the whole
- * key and a checksum, so that neither a collision nor a damaged file can pass for a program. The
- * key is everything that the binary depends on. */
+/* FNV-1a, 64 bits (Fowler, Noll, Vo). */
+uint64_t ov_hash(const void *bytes, size_t count);
+
+/* The cache of compiled programs, and of self-tests passed: one file <program>-<hash of key>.bin
+ * each, which holds the whole key and a checksum, so that neither a collision nor a damaged file
+ * can pass for a program. The key is everything that the binary depends on. */
 
 /* Whether OVOID_CACHE ("off", "on" or "auto") and the driver call for the cache. "auto" leaves it
  * to drivers that have their own. An unknown value is worth a warning and counts as "auto". */

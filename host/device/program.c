@@ -91,6 +91,10 @@ cleanup:
     return status;
 }
 
+ovoid_status ov_whole_source(ov_text *text) {
+    return program_source(NULL, OV_WHOLE, text);
+}
+
 /* ---- binaries ----------------------------------------------------------------------------- */
 
 static ovoid_status append_platform(ov_text *key, cl_platform_id id, cl_platform_info what) {
@@ -107,9 +111,7 @@ static ovoid_status append_device(ov_text *key, cl_device_id id, cl_device_info 
     return ov_text_append(NULL, key, text, strlen(text) + 1);
 }
 
-/* All that a binary depends on, each part with its null byte. Failing means no caching. */
-static ovoid_status binary_key(const ov_device *device, const char *options, const ov_text *source,
-                               ov_text *key) {
+ovoid_status ov_device_key(const ov_device *device, ov_text *key) {
     ovoid_status status = OVOID_OK;
     OV_TRY(append_platform(key, device->platform, CL_PLATFORM_NAME));
     OV_TRY(append_platform(key, device->platform, CL_PLATFORM_VERSION));
@@ -117,6 +119,15 @@ static ovoid_status binary_key(const ov_device *device, const char *options, con
     OV_TRY(append_device(key, device->id, CL_DEVICE_VENDOR));
     OV_TRY(append_device(key, device->id, CL_DEVICE_VERSION));
     OV_TRY(append_device(key, device->id, CL_DRIVER_VERSION));
+cleanup:
+    return status;
+}
+
+/* All that a binary depends on, each part with its null byte. Failing means no caching. */
+static ovoid_status binary_key(const ov_device *device, const char *options, const ov_text *source,
+                               ov_text *key) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_device_key(device, key));
     OV_TRY(ov_text_append(NULL, key, options, strlen(options) + 1));
     OV_TRY(ov_text_append(NULL, key, source->text, source->length));
 cleanup:
@@ -216,17 +227,21 @@ static ovoid_status build_source(ovoid_context *context, const ov_device *device
     return OVOID_OK;
 }
 
+void ov_program_options(const ov_device *device, char options[OV_OPTIONS_SIZE]) {
+    snprintf(options, OV_OPTIONS_SIZE,
+             "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d -DOV_TEAM=%u "
+             "-DOV_SOLVE_GROUP=%u",
+             (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK,
+             (unsigned)device->team, (unsigned)device->solve_group);
+}
+
 static ovoid_status make_program(ovoid_context *context, ov_device *device, const char *stem,
                                  cl_program *handle) {
     ovoid_status status = OVOID_OK;
     ov_text source = {0}, key = {0};
     cl_program made = NULL;
-    char options[160];
-    snprintf(options, sizeof options,
-             "-cl-std=CL1.2 -DOV_VECTOR=%u -DOV_LANES=%u -DOV_PACK=%d -DOV_TEAM=%u "
-             "-DOV_SOLVE_GROUP=%u",
-             (unsigned)device->shape.vector, (unsigned)device->shape.lanes, OV_PACK,
-             (unsigned)device->team, (unsigned)device->solve_group);
+    char options[OV_OPTIONS_SIZE];
+    ov_program_options(device, options);
     OV_TRY(program_source(context, stem, &source));
     bool cache =
         ov_cache_wanted(context, device) && binary_key(device, options, &source, &key) == OVOID_OK;
@@ -371,6 +386,8 @@ ovoid_status ov_kernel_create(ovoid_context *context, const char *program, const
     ov_device *device;
     ovoid_status status = ov_device_get(context, &device);
     if (status != OVOID_OK)
+        return status;
+    if ((status = ov_device_trust(context, device)) != OVOID_OK)
         return status;
     struct ov_made *made = device->made;
     while (made &&

@@ -4,6 +4,7 @@
 #include "base/sized.h"
 #include "base/tenant.h"
 #include "fit/adaptive/adaptive.h"
+#include "fit/adaptive/constants.h"
 #include "fit/l1/l1.h"
 #include "fit/motion.h"
 #include "fit/options.h"
@@ -16,9 +17,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* An atom's owner is looked for among the ellipsoids this near (angstrom), if there are any. */
-#define OWNER_REACH 15.0
 
 struct ovoid_fitter {
     ov_tenant tenant;
@@ -275,7 +273,7 @@ static ovoid_status find_owners(const ovoid_fitter *fitter, ov_found *found) {
     uint32_t near[2 * OV_NEAR_MAX];
     ov_grid grid = {0};
     OV_TRY(ov_grid_of(fitter->context, found->quadrics->centre, sizeof *found->quadrics,
-                      found->count, OWNER_REACH, &grid));
+                      found->count, ov_tuned.owner_reach, &grid));
     for (size_t i = 0; i < fitter->atoms; ++i) {
         const double *const at = fitter->xyzr + 4 * i;
         const size_t near_count = ov_grid_near(&grid, at, UINT32_MAX, near);

@@ -1,15 +1,11 @@
 #include "fit/motion.h"
 
+#include "fit/adaptive/constants.h"
 #include "neighbours/neighbours.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Atoms this near to an ellipsoid's centre tell how it has turned (angstrom), where there are so
- * many of them: its own alone are few, and their small motions would turn it. */
-#define ABOUT 8.0
-#define ENOUGH 12
 
 /* ---- one motion ------------------------------------------------------------------------------ */
 
@@ -132,7 +128,7 @@ static void move_one(const double *before, const double *after, const ov_motion 
                      const uint32_t *near, size_t near_count, const uint32_t *own, size_t own_count,
                      ov_quadric *quadric) {
     ov_motion motion = *whole;
-    if (near_count >= ENOUGH)
+    if (near_count >= ov_tuned.motion_enough)
         ov_motion_of(before, after, near, near_count, &motion);
     if (own_count > 0) {
         mean_of(before, own, own_count, motion.from);
@@ -154,7 +150,7 @@ ovoid_status ov_move_with_atoms(ovoid_context *context, const double *before, co
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    OV_TRY(ov_grid_of(context, before, 4 * sizeof *before, atoms, ABOUT, &grid));
+    OV_TRY(ov_grid_of(context, before, 4 * sizeof *before, atoms, ov_tuned.motion_about, &grid));
     sort_by_owner(owner, atoms, count, first, atom);
     ov_motion_of(before, after, NULL, atoms, &whole);
     for (size_t i = 0; i < count; ++i) {

@@ -1,7 +1,7 @@
 /*
  * The adaptive method's parameters of one ellipsoid: ln a, the centre, and the lower triangle of L
  * with A = L L^T. No angles: nothing degenerates where two axes are equal. (The maps between
- * parameters and monomials are in kernels/solve.cl; their twin is tests/reference/factor.c.)
+ * parameters and monomials are in kernels/solve.cl; their twin is selftest/twin_factor.c.)
  */
 #ifndef OV_FACTOR_H
 #define OV_FACTOR_H

@@ -407,8 +407,7 @@ static void *trimmed(void *array, size_t count, size_t size) {
     return exact ? exact : array;
 }
 
-/* When all radii are known: of a structure they come last. */
-static void count_zero_radii(ovoid_molecule *molecule) {
+void ov_molecule_count_zero_radii(ovoid_molecule *molecule) {
     molecule->counts.zero_radius = 0;
     for (size_t i = 0; i < molecule->atoms; i++)
         molecule->counts.zero_radius += molecule->xyzr[4 * i + 3] == 0;
@@ -474,7 +473,7 @@ ovoid_status ovoid_molecule_read_with(ovoid_context *context, const char *path,
     OV_TRY(read_text(&reader, reader.guess ? format_by_name(path) : options.format));
     OV_TRY(ov_progress_ask(context));
     trim(reader.molecule);
-    count_zero_radii(reader.molecule);
+    ov_molecule_count_zero_radii(reader.molecule);
     OV_TRY(ov_molecule_doubts(context, ov_text_name(reader.text), reader.molecule));
     reader.molecule->counts.atoms = ovoid_molecule_atoms(reader.molecule);
     reader.molecule->counts.unit_atoms = reader.molecule->atoms;
@@ -534,7 +533,7 @@ ovoid_status ovoid_molecule_create(ovoid_context *context, const double *xyzr, s
     made->counts.atoms = atoms;
     made->counts.unit_atoms = atoms;
     made->counts.size = sizeof made->counts;
-    count_zero_radii(made);
+    ov_molecule_count_zero_radii(made);
     made->counts.models = 1;
     made->radii = OVOID_RADII_OWN;
     made->model = 1;

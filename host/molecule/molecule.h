@@ -44,6 +44,9 @@ struct ovoid_molecule {
     double *all_xyzr; /* 4 * all_atoms, made when first asked for */
 };
 
+/* When all radii are known: of a structure they come last. */
+void ov_molecule_count_zero_radii(ovoid_molecule *molecule);
+
 /* Warns of atoms without a radius, and of atoms at the place of another. */
 ovoid_status ov_molecule_doubts(ovoid_context *context, const char *name,
                                 const ovoid_molecule *molecule);

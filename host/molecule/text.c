@@ -36,7 +36,7 @@ struct ov_text {
 };
 
 const char *ov_text_name(const ov_text *text) {
-    return text->name;
+    return text ? text->name : "molecule";
 }
 
 /* The path as it may stand in a message: a control character could play with the terminal. */

@@ -4,6 +4,9 @@
 #include "base/progress.h"
 #include "base/sized.h"
 #include "model/fields.h"
+#include "write/ihm.h"
+#include "write/page.h"
+#include "write/scene.h"
 #include "write/text.h"
 
 #include <math.h>
@@ -18,22 +21,31 @@ typedef struct format {
                                const ov_drawing *drawing, FILE *stream);
     ovoid_status (*map)(ovoid_context *context, const ov_map *map, FILE *stream);
     int bytes; /* of a map's value */
+    ovoid_status (*scene)(ovoid_context *context, const ov_scene *scene,
+                          const ovoid_export_options *options, const char *title, FILE *stream);
 } format;
 
 static const format formats[] = {
-    [OVOID_EXPORT_AUTO] = {"", "", NULL, NULL, 0},
-    [OVOID_EXPORT_BILD] = {"bild", ".bild .bld", ov_write_bild, NULL, 0},
-    [OVOID_EXPORT_CXC] = {"cxc", ".cxc", ov_write_cxc, NULL, 0},
-    [OVOID_EXPORT_PYMOL] = {"pymol", ".py", ov_write_pymol, NULL, 0},
-    [OVOID_EXPORT_GMM] = {"gmm", ".gmm", ov_write_gmm, NULL, 0},
-    [OVOID_EXPORT_JSON] = {"json", ".json", ov_write_json, NULL, 0},
-    [OVOID_EXPORT_CCP4] = {"ccp4", ".mrc .map .ccp4", NULL, ov_write_ccp4, 4},
-    [OVOID_EXPORT_DX] = {"dx", ".dx", NULL, ov_write_dx, 13},
+    [OVOID_EXPORT_AUTO] = {"", "", NULL, NULL, 0, NULL},
+    [OVOID_EXPORT_BILD] = {"bild", ".bild .bld", ov_write_bild, NULL, 0, NULL},
+    [OVOID_EXPORT_CXC] = {"cxc", ".cxc", ov_write_cxc, NULL, 0, NULL},
+    [OVOID_EXPORT_PYMOL] = {"pymol", ".py", ov_write_pymol, NULL, 0, NULL},
+    [OVOID_EXPORT_GMM] = {"gmm", ".gmm", ov_write_gmm, NULL, 0, NULL},
+    [OVOID_EXPORT_JSON] = {"json", ".json", ov_write_json, NULL, 0, NULL},
+    [OVOID_EXPORT_CCP4] = {"ccp4", ".mrc .map .ccp4", NULL, ov_write_ccp4, 4, NULL},
+    [OVOID_EXPORT_DX] = {"dx", ".dx", NULL, ov_write_dx, 13, NULL},
+    [OVOID_EXPORT_XYZ] = {"xyz", ".xyz .extxyz", ov_write_xyz, NULL, 0, NULL},
+    [OVOID_EXPORT_LAMMPS] = {"lammps", ".lmp .data", ov_write_lammps, NULL, 0, NULL},
+    [OVOID_EXPORT_ANISOU] = {"anisou", ".pdb .ent", ov_write_anisou, NULL, 0, NULL},
+    [OVOID_EXPORT_SPLAT] = {"splat", ".gltf", ov_write_splat, NULL, 0, NULL},
+    [OVOID_EXPORT_IHM] = {"ihm", ".cif .mmcif", NULL, NULL, 0, ov_write_ihm},
+    [OVOID_EXPORT_HTML] = {"html", ".html .htm", NULL, NULL, 0, ov_write_page},
 };
 enum { FORMATS = sizeof formats / sizeof *formats };
 
-#define ELLIPSOID_ENDINGS ".bild, .cxc, .py, .gmm, .json"
+#define ELLIPSOID_ENDINGS ".bild, .cxc, .py, .gmm, .json, .xyz, .lmp, .pdb, .gltf, .cif"
 #define MAP_ENDINGS ".mrc, .map, .ccp4, .dx"
+#define SCENE_ENDINGS ".html"
 
 const char *ovoid_export_format_name(ovoid_export_format which) {
     return which > OVOID_EXPORT_AUTO && (size_t)which < FORMATS ? formats[which].name : NULL;
@@ -55,7 +67,8 @@ void ovoid_export_options_init(ovoid_export_options *options, size_t size) {
     static const ovoid_export_options defaults = {.spacing = OVOID_DEFAULT_MESH_SPACING,
                                                   .colour = {0.30, 0.55, 0.80},
                                                   .opacity = 1.0,
-                                                  .max_gigabytes = OVOID_DEFAULT_MAP_GIGABYTES};
+                                                  .max_gigabytes = OVOID_DEFAULT_MAP_GIGABYTES,
+                                                  .max_triangles = OVOID_DEFAULT_MAX_TRIANGLES};
     ov_sized_init(options, size, &defaults, sizeof defaults);
 }
 
@@ -83,6 +96,12 @@ static ovoid_status take_options(ovoid_context *context, const ovoid_export_opti
     if (!(o->max_gigabytes > 0.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "a map of at most %g gigabytes is none",
                        o->max_gigabytes);
+    if (!(o->range >= 0.0 && isfinite(o->range)))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "range must be finite and not negative; it is %g", o->range);
+    if (!(o->max_triangles >= 1.0))
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "a surface of at most %g triangles is none",
+                       o->max_triangles);
     if (!is_share(o->colour[0]) || !is_share(o->colour[1]) || !is_share(o->colour[2]) ||
         !is_share(o->opacity))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
@@ -109,9 +128,9 @@ static ovoid_status choose_format(ovoid_context *context, const char *path,
     if (which == OVOID_EXPORT_AUTO)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "'%s' does not say what to write: its name would end in one of "
-                       "%s" MAP_ENDINGS,
+                       "%s" MAP_ENDINGS ", " SCENE_ENDINGS,
                        path, model ? ELLIPSOID_ENDINGS ", " : "");
-    if (!model && !(*chosen)->map)
+    if (!model && ((*chosen)->ellipsoids || which == OVOID_EXPORT_IHM))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "a molecule has no ellipsoids to write as %s: fit a model to it first, or "
                        "write a map (" MAP_ENDINGS ")",
@@ -119,20 +138,35 @@ static ovoid_status choose_format(ovoid_context *context, const char *path,
     return OVOID_OK;
 }
 
+/* What a format takes of these. */
+typedef struct content {
+    const ovoid_model *model; /* ellipsoids */
+    const ov_drawing *drawing;
+    const ov_map *map;
+    const ov_scene *scene;
+    const ovoid_export_options *options; /* of the scene */
+    const char *title;
+} content;
+
+static ovoid_status write_content(ovoid_context *context, const format *chosen, const content *c,
+                                  FILE *stream) {
+    if (chosen->map)
+        return chosen->map(context, c->map, stream);
+    if (chosen->scene)
+        return chosen->scene(context, c->scene, c->options, c->title, stream);
+    return chosen->ellipsoids(context, c->model, c->drawing, stream);
+}
+
 /* Writes what the chosen format takes, whole or not at all. */
 static ovoid_status write_file(ovoid_context *context, const char *path, const format *chosen,
-                               const ovoid_model *model, const ov_drawing *drawing,
-                               const ov_map *map) {
+                               const content *c) {
     ovoid_status status = OVOID_OK;
     ov_output output = {0};
     ov_locale locale = {0};
     ov_progress_begin(context, chosen->map ? "map" : "write");
     OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
-    if (chosen->map)
-        OV_TRY(chosen->map(context, map, output.stream));
-    else
-        OV_TRY(chosen->ellipsoids(context, model, drawing, output.stream));
+    OV_TRY(write_content(context, chosen, c, output.stream));
     OV_TRY(ov_stream_check(context, output.stream, path));
     status = ov_output_commit(context, &output);
 
@@ -170,7 +204,23 @@ static ovoid_status write_map(ovoid_context *context, const char *path, const fo
         status = check_size(context, &map, chosen->bytes, options->max_gigabytes);
     if (status == OVOID_OK)
         status = ov_field_load(context, field, &map.evaluator);
-    return status == OVOID_OK ? write_file(context, path, chosen, NULL, NULL, &map) : status;
+    return status == OVOID_OK ? write_file(context, path, chosen, &(content){.map = &map}) : status;
+}
+
+static ovoid_status write_ellipsoids(ovoid_context *context, const char *path, const format *chosen,
+                                     const ovoid_export_options *options, double isovalue,
+                                     const ovoid_model *model) {
+    ov_drawing drawing = {.isovalue = isovalue, .opacity = options->opacity};
+    memcpy(drawing.colour, options->colour, sizeof drawing.colour);
+    ov_title(path, drawing.title, sizeof drawing.title);
+    return write_file(context, path, chosen, &(content){.model = model, .drawing = &drawing});
+}
+
+static ovoid_status export_field(ovoid_context *context, ovoid_field *field, const char *path,
+                                 const format *chosen, const ovoid_export_options *o) {
+    const double isovalue = o->isovalue > 0.0 ? o->isovalue : field->isovalue;
+    return chosen->map ? write_map(context, path, chosen, o, isovalue, field)
+                       : write_ellipsoids(context, path, chosen, o, isovalue, field->model);
 }
 
 ovoid_status ovoid_field_export(ovoid_context *context, ovoid_field *field, const char *path,
@@ -187,11 +237,45 @@ ovoid_status ovoid_field_export(ovoid_context *context, ovoid_field *field, cons
         status = choose_format(context, path, &o, field->model != NULL, &chosen);
     if (status != OVOID_OK)
         return status;
-    const double isovalue = o.isovalue > 0.0 ? o.isovalue : field->isovalue;
-    if (chosen->map)
-        return write_map(context, path, chosen, &o, isovalue, field);
-    ov_drawing drawing = {.isovalue = isovalue, .opacity = o.opacity};
-    memcpy(drawing.colour, o.colour, sizeof drawing.colour);
-    ov_title(path, drawing.title, sizeof drawing.title);
-    return write_file(context, path, chosen, field->model, &drawing, NULL);
+    if (chosen->scene)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "a field alone is no scene, as %s needs one: ovoid_scene_export()",
+                       chosen->name);
+    return export_field(context, field, path, chosen, &o);
+}
+
+/* ---- scenes --------------------------------------------------------------------------------- */
+
+static ovoid_status export_scene(ovoid_context *context, ov_scene *scene, const char *path,
+                                 const format *chosen, const ovoid_export_options *o) {
+    char name[64];
+    ovoid_status status = ov_scene_fields(context, scene);
+    if (status != OVOID_OK)
+        return status;
+    if (!chosen->scene)
+        return export_field(context, scene->count ? scene->fields[0] : scene->original, path,
+                            chosen, o);
+    ov_title(path, name, sizeof name);
+    return write_file(
+        context, path, chosen,
+        &(content){.scene = scene, .options = o, .title = scene->title ? scene->title : name});
+}
+
+ovoid_status ovoid_scene_export(ovoid_context *context, const ovoid_scene *scene, const char *path,
+                                const ovoid_export_options *options) {
+    OV_NEED(context, context);
+    OV_NEED(context, scene);
+    OV_NEED(context, path);
+    ovoid_export_options o;
+    const format *chosen;
+    ov_scene s = {0};
+    ovoid_status status = ov_scene_take(context, scene, &s);
+    if (status == OVOID_OK)
+        status = take_options(context, options, &o);
+    if (status == OVOID_OK)
+        status = choose_format(context, path, &o, s.count > 0, &chosen);
+    if (status == OVOID_OK)
+        status = export_scene(context, &s, path, chosen, &o);
+    ov_scene_drop(&s);
+    return status;
 }

@@ -38,6 +38,14 @@ void ov_solid_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, double isovalue, ov
  * (degrees, 0 to 180). */
 void ov_solid_rotation(const ov_solid *solid, double vector[3], double *angle);
 
+/* The same as a quaternion x, y, z, w of length 1, with w >= 0. */
+void ov_solid_quaternion(const ov_solid *solid, double q[4]);
+
+/* Of the Gaussian a exp(-z^T A z): its integral over all space, a sqrt(pi^3 / det A), angstrom^3;
+ * and (2 A)^-1 = R^T diag(1 / (2 d)) R, as xx, xy, xz, yy, yz, zz, angstrom^2. */
+double ov_ellipsoid_integral(const ovoid_ellipsoid *ellipsoid);
+void ov_ellipsoid_covariance(const ovoid_ellipsoid *ellipsoid, double c[6]);
+
 ovoid_status ov_write_bild(ovoid_context *context, const ovoid_model *model,
                            const ov_drawing *drawing, FILE *stream);
 ovoid_status ov_write_cxc(ovoid_context *context, const ovoid_model *model,
@@ -48,6 +56,14 @@ ovoid_status ov_write_gmm(ovoid_context *context, const ovoid_model *model,
                           const ov_drawing *drawing, FILE *stream);
 ovoid_status ov_write_json(ovoid_context *context, const ovoid_model *model,
                            const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_xyz(ovoid_context *context, const ovoid_model *model,
+                          const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_lammps(ovoid_context *context, const ovoid_model *model,
+                             const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_anisou(ovoid_context *context, const ovoid_model *model,
+                             const ov_drawing *drawing, FILE *stream);
+ovoid_status ov_write_splat(ovoid_context *context, const ovoid_model *model,
+                            const ov_drawing *drawing, FILE *stream);
 
 /* ---- maps --------------------------------------------------------------------------------- */
 

@@ -11,31 +11,14 @@
 #include "write/export.h"
 
 #include "base/progress.h"
-#include "model/ellipsoid.h"
-
-#include <math.h>
 
 enum { NUMBERS = 999, RESIDUES = 9999, SERIALS = 99999 };
-
-static double integral(const ovoid_ellipsoid *e) {
-    static const double pi = 3.14159265358979323846;
-    return e->amplitude * sqrt(pi / e->decay[0]) * sqrt(pi / e->decay[1]) * sqrt(pi / e->decay[2]);
-}
-
-/* (2 A)^-1 = R^T diag(1 / (2 d)) R, as xx, xy, xz, yy, yz, zz. */
-static void covariance(const ovoid_ellipsoid *e, double c[6]) {
-    double r[3][3], variance[3];
-    ov_rotation(e->angle, r);
-    for (int p = 0; p < 3; p++)
-        variance[p] = 0.5 / e->decay[p];
-    ov_quadratic_form(r, variance, c);
-}
 
 static void write_gaussian(const ovoid_ellipsoid *e, size_t index, double weight, FILE *stream) {
     const int number = (int)(index % NUMBERS) + 1;
     const double *x = e->centre;
     double c[6];
-    covariance(e, c);
+    ov_ellipsoid_covariance(e, c);
     fprintf(stream, "HETATM%5d  GAU GAU A%4d    %8.3f%8.3f%8.3f%6.3f%6.3f\n",
             (int)(index % SERIALS) + 1, (int)(index % RESIDUES) + 1, x[0], x[1], x[2], weight,
             weight);
@@ -54,7 +37,7 @@ ovoid_status ov_write_gmm(ovoid_context *context, const ovoid_model *model,
     const size_t count = ovoid_model_size(model);
     double total = 0.0;
     for (size_t i = 0; i < count; i++)
-        total += integral(&ellipsoids[i]);
+        total += ov_ellipsoid_integral(&ellipsoids[i]);
     fprintf(stream,
             "HEADER 3D Gaussian Mixture Model\n"
             "REMARK COMMAND ovoid export\n"
@@ -66,7 +49,7 @@ ovoid_status ov_write_gmm(ovoid_context *context, const ovoid_model *model,
         fprintf(stream, "REMARK COMMENT numbers begin again after %d\n", NUMBERS);
     for (size_t i = 0; i < count && !ferror(stream); i++) {
         OV_TRY(ov_progress_turn(context, i, count));
-        write_gaussian(&ellipsoids[i], i, integral(&ellipsoids[i]) / total, stream);
+        write_gaussian(&ellipsoids[i], i, ov_ellipsoid_integral(&ellipsoids[i]) / total, stream);
     }
     fputs("TER\n", stream);
 cleanup:

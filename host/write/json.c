@@ -2,27 +2,7 @@
 #include "write/export.h"
 
 #include "base/progress.h"
-
-#include <string.h>
-
-/* Text that is no UTF-8 (a file name may be anything) is made so. */
-static void write_string(const char *string, FILE *stream) {
-    const unsigned char *text = (const unsigned char *)string;
-    putc('"', stream);
-    while (*text) {
-        const size_t length = ov_utf8_length(text);
-        if (length == 0)
-            fputs("\\ufffd", stream);
-        else if (*text < 0x20)
-            fprintf(stream, "\\u%04x", *text);
-        else if (*text == '"' || *text == '\\')
-            fprintf(stream, "\\%c", *text);
-        else
-            fwrite(text, 1, length, stream);
-        text += length ? length : 1;
-    }
-    putc('"', stream);
-}
+#include "write/text.h"
 
 static void write_vector(const char *key, const double *v, FILE *stream) {
     fprintf(stream, "\"%s\": [%.9g, %.9g, %.9g]", key, v[0], v[1], v[2]);
@@ -64,7 +44,7 @@ ovoid_status ov_write_json(ovoid_context *context, const ovoid_model *model,
             drawing->isovalue);
     for (size_t i = 0; (note = ovoid_model_note(model, i)) != NULL && !ferror(stream); i++) {
         fputs(i ? ",\n    " : "\n    ", stream);
-        write_string(note, stream);
+        ov_json_string(note, stream);
     }
     fputs(ovoid_model_note(model, 0) ? "\n  ],\n" : "],\n", stream);
     fputs("  \"ellipsoids\": [\n", stream);

@@ -15,33 +15,53 @@ void ov_solid_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, double isovalue, ov
     }
 }
 
-/* Through the quaternion, whose largest part is found first: no angle is special. */
-void ov_solid_rotation(const ov_solid *solid, double vector[3], double *angle) {
-    static const double degrees = 180.0 / 3.14159265358979323846;
+/* Its largest part is found first: no angle is special. */
+void ov_solid_quaternion(const ov_solid *solid, double q[4]) {
     double m[3][3]; /* its columns are the axes */
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             m[i][j] = solid->axis[j][i];
     const double trace = m[0][0] + m[1][1] + m[2][2];
-    double w, v[3];
     int i = 0;
     for (int k = 1; k < 3; k++)
         if (m[k][k] > m[i][i])
             i = k;
     if (trace >= m[i][i]) { /* four times the quaternion times its largest part */
-        w = 1.0 + trace;
+        q[3] = 1.0 + trace;
         for (int k = 0; k < 3; k++)
-            v[k] = m[(k + 2) % 3][(k + 1) % 3] - m[(k + 1) % 3][(k + 2) % 3];
+            q[k] = m[(k + 2) % 3][(k + 1) % 3] - m[(k + 1) % 3][(k + 2) % 3];
     } else {
         const int j = (i + 1) % 3, k = (i + 2) % 3;
-        w = m[k][j] - m[j][k];
-        v[i] = 1.0 + m[i][i] - m[j][j] - m[k][k];
-        v[j] = m[i][j] + m[j][i];
-        v[k] = m[i][k] + m[k][i];
+        q[3] = m[k][j] - m[j][k];
+        q[i] = 1.0 + m[i][i] - m[j][j] - m[k][k];
+        q[j] = m[i][j] + m[j][i];
+        q[k] = m[i][k] + m[k][i];
     }
-    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    const double sign = w < 0.0 ? -1.0 : 1.0;
+    const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const double signed_length = q[3] < 0.0 ? -length : length;
+    for (int k = 0; k < 4; k++)
+        q[k] = q[k] / signed_length + 0.0;
+}
+
+void ov_solid_rotation(const ov_solid *solid, double vector[3], double *angle) {
+    static const double degrees = 180.0 / 3.14159265358979323846;
+    double q[4];
+    ov_solid_quaternion(solid, q);
+    const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
     for (int k = 0; k < 3; k++)
-        vector[k] = length > 0.0 ? sign * v[k] / length : k == 2;
-    *angle = 2.0 * atan2(length, fabs(w)) * degrees;
+        vector[k] = length > 0.0 ? q[k] / length : k == 2;
+    *angle = 2.0 * atan2(length, q[3]) * degrees;
+}
+
+double ov_ellipsoid_integral(const ovoid_ellipsoid *e) {
+    static const double pi = 3.14159265358979323846;
+    return e->amplitude * sqrt(pi / e->decay[0]) * sqrt(pi / e->decay[1]) * sqrt(pi / e->decay[2]);
+}
+
+void ov_ellipsoid_covariance(const ovoid_ellipsoid *e, double c[6]) {
+    double r[3][3], variance[3];
+    ov_rotation(e->angle, r);
+    for (int p = 0; p < 3; p++)
+        variance[p] = 0.5 / e->decay[p];
+    ov_quadratic_form(r, variance, c);
 }

@@ -69,3 +69,25 @@ void ov_title(const char *path, char *title, size_t size) {
     if (!sensible)
         snprintf(title, size, "ovoid");
 }
+
+void ov_json_text(const char *string, FILE *stream) {
+    const unsigned char *text = (const unsigned char *)string;
+    while (*text) {
+        const size_t length = ov_utf8_length(text);
+        if (length == 0)
+            fputs("\\ufffd", stream);
+        else if (*text < 0x20 || *text == '<')
+            fprintf(stream, "\\u%04x", *text);
+        else if (*text == '"' || *text == '\\')
+            fprintf(stream, "\\%c", *text);
+        else
+            fwrite(text, 1, length, stream);
+        text += length ? length : 1;
+    }
+}
+
+void ov_json_string(const char *string, FILE *stream) {
+    putc('"', stream);
+    ov_json_text(string, stream);
+    putc('"', stream);
+}

@@ -34,4 +34,9 @@ bool ov_extension_is(const char *extension, const char *known);
  * everything else becomes '_'. "ovoid" for standard output and the like. */
 void ov_title(const char *path, char *title, size_t size);
 
+/* Text as a string of JSON (RFC 8259), also within a page: '<' is escaped. What is no UTF-8 (a file
+ * name may be anything) is made so. The second one without the quotes about it. */
+void ov_json_string(const char *string, FILE *stream);
+void ov_json_text(const char *string, FILE *stream);
+
 #endif

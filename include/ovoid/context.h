@@ -56,6 +56,10 @@ OVOID_API const char *ovoid_status_name(ovoid_status status);
 OVOID_API const char *ovoid_version(void);
 OVOID_API uint32_t ovoid_abi(void);
 
+/* Bytes of a public structure in the library that is running, by the name of its type, such as
+ * "ovoid_fit_options"; 0 for other names. For bindings, which have no header to compile. */
+OVOID_API size_t ovoid_sizeof(const char *type);
+
 /* ---- context ------------------------------------------------------------------------------ */
 
 /* Holds the last error and, once opened, the device with its compiled programs and buffers. */
@@ -100,7 +104,8 @@ typedef struct ovoid_adaptive_progress { /* 8 bytes */
 typedef struct ovoid_progress {
     size_t size;
     const char *stage;    /* one word: "read" or "write" (a file), "open" (a device), "compile"
-                             (kernels), "field", "mesh", "measure" (distances), "map", "render"; of
+                             (kernels), "selftest" (of a device, at its first use), "field", "mesh",
+                             "measure" (distances), "map", "render"; of
                              a fit also "sample"; of l1 "sparse" or "accuracy"; of adaptive "merge",
                              "refine", "repair", "grow" or "shrink" */
     uint64_t done, total; /* of this stage, in parts of its own; total may be OVOID_UNKNOWN */
@@ -159,10 +164,15 @@ typedef struct ovoid_device_info {
     char opencl[64]; /* e.g. "OpenCL 3.0 ..." as the device reports it */
     uint32_t compute_units;
     uint32_t clock_mhz;
-    uint32_t float_width;    /* preferred vector width for float */
-    bool fp64;               /* double precision in kernels; Ovoid does not need it */
-    uint64_t global_memory;  /* bytes, as the driver reports them */
-    uint64_t max_allocation; /* bytes of one buffer */
+    uint32_t float_width;      /* preferred vector width for float */
+    bool fp64;                 /* double precision in kernels; Ovoid does not need it */
+    uint64_t global_memory;    /* bytes, as the driver reports them */
+    uint64_t max_allocation;   /* bytes of one buffer */
+    uint64_t local_memory;     /* bytes that a work-group shares */
+    uint64_t max_group;        /* work-items of a work-group, at most */
+    char pci[16];              /* address on the PCI bus, such as "0000:3b:00.0"; "" if not told */
+    char uuid[40];             /* "01234567-89ab-cdef-0123-456789abcdef"; "" if not told */
+    char platform_version[64]; /* e.g. "OpenCL 3.0 PoCL ..." */
 } ovoid_device_info;
 
 /* Lists every device of every platform. A platform that fails is skipped with a warning. size is
@@ -172,10 +182,13 @@ typedef struct ovoid_device_info {
 OVOID_API ovoid_status ovoid_devices(ovoid_context *context, size_t size,
                                      ovoid_device_info **devices, size_t *count);
 
-/* Opens the device that selector names: an index ("0"), a type ("cpu", "gpu", "accelerator") or
+/* Opens the device that selector names: an index ("0"), a type ("cpu", "gpu", "accelerator"), an
+ * address on the PCI bus ("3b:00.0", "0000:3b:00.0"), a UUID or its beginning as "GPU-01234567", or
  * part of a device or platform name in any case. NULL or "" takes the environment variable
  * OVOID_DEVICE, and without it the first GPU, else the first device. The first device whose match
- * is found is taken. Replaces the device opened before; objects made on that one must be gone. */
+ * is found is taken. A list ("0,1") and "all" are refused with OVOID_ERROR_DEVICE where they name
+ * more than one device, since one is used. Replaces the device opened before; objects made on that
+ * one must be gone. */
 OVOID_API ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector);
 
 /* The opened device, NULL before one is opened. */

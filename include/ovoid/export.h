@@ -1,5 +1,5 @@
 /*
- * Models and fields for other programs.
+ * Models, fields and surfaces for other programs, and as a page for a browser.
  */
 #ifndef OVOID_EXPORT_H
 #define OVOID_EXPORT_H
@@ -20,7 +20,15 @@ typedef enum ovoid_export_format {
     OVOID_EXPORT_JSON,     /* .json */
     /* and the field on a lattice, of models and molecules: */
     OVOID_EXPORT_CCP4, /* .mrc, .map, .ccp4: MRC2014, 32-bit floats */
-    OVOID_EXPORT_DX    /* .dx: OpenDX text as APBS writes it */
+    OVOID_EXPORT_DX,   /* .dx: OpenDX text as APBS writes it */
+    /* and of a scene, a molecule and its models: */
+    OVOID_EXPORT_HTML, /* .html, .htm: a page to turn them in, one file without network access */
+    OVOID_EXPORT_IHM,  /* .cif, .mmcif: IHMCIF, the category ihm_gaussian_obj_site */
+    /* and more ellipsoids, of models: */
+    OVOID_EXPORT_XYZ,    /* .xyz, .extxyz: extended XYZ with semi-axes and orientations, OVITO's */
+    OVOID_EXPORT_LAMMPS, /* .lmp, .data: LAMMPS data of atom style ellipsoid */
+    OVOID_EXPORT_ANISOU, /* .pdb, .ent: pseudo-atoms with ANISOU */
+    OVOID_EXPORT_SPLAT   /* .gltf: glTF with KHR_gaussian_splatting */
 } ovoid_export_format;
 
 typedef struct ovoid_export_options {
@@ -35,12 +43,18 @@ typedef struct ovoid_export_options {
     double colour[3];     /* red, green, blue from 0 to 1, of drawn ellipsoids */
     double opacity;       /* from 0 to 1, of drawn ellipsoids */
     double max_gigabytes; /* a map that would take more (1e9 bytes each) is refused */
+    double range;         /* of a difference's colours, angstrom to either side; 0: what 99 % of
+                             the surfaces stay within, rounded up */
+    double max_triangles; /* of a surface in a page: the spacing becomes larger where it would have
+                             more */
 } ovoid_export_options;
 
 #define OVOID_DEFAULT_MAP_GIGABYTES 1.0
+#define OVOID_DEFAULT_MAX_TRIANGLES 5e5
 
-/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, an opaque blue, maps of up
- * to OVOID_DEFAULT_MAP_GIGABYTES; size is sizeof *options. */
+/* Format by extension, isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING (of maps and of surfaces), an
+ * opaque blue, maps of up to OVOID_DEFAULT_MAP_GIGABYTES, range 0, OVOID_DEFAULT_MAX_TRIANGLES;
+ * size is sizeof *options. */
 OVOID_API void ovoid_export_options_init(ovoid_export_options *options, size_t size);
 
 /* Writes a file for another program, whole or not at all; "-" is standard output and needs a
@@ -49,6 +63,32 @@ OVOID_API void ovoid_export_options_init(ovoid_export_options *options, size_t s
  * on the device and written piece by piece: memory does not grow with it; OVOID_ERROR_LIMIT, before
  * anything is computed, where it would take more than max_gigabytes. */
 OVOID_API ovoid_status ovoid_field_export(ovoid_context *context, ovoid_field *field,
+                                          const char *path, const ovoid_export_options *options);
+
+/* What a scene shows: a molecule, models of it, or both. Nothing is copied, and all of it must live
+ * as long as the call that it is given to. */
+typedef struct ovoid_scene {
+    size_t size;
+    const ovoid_molecule *molecule; /* NULL: none */
+    const ovoid_model *const
+        *models; /* levels of detail, the finest first; NULL with a count of 0 */
+    size_t model_count;
+    const char *title; /* UTF-8; NULL: the name of the file that is written */
+    double decay;      /* of the molecule's field, angstrom^-2; 0: the first model's, or
+                          OVOID_DEFAULT_DECAY without one */
+    double isovalue;   /* of the molecule's surface; 0: likewise */
+} ovoid_scene;
+
+/* Nothing in it; size is sizeof *scene. */
+OVOID_API void ovoid_scene_init(ovoid_scene *scene, size_t size);
+
+/* Writes a scene as a file of any format, whole or not at all; "-" is standard output and needs a
+ * format. options may be NULL. Surfaces are meshed, and their distances measured, on the device.
+ * Formats of ellipsoids take the first model, and maps the field of the first model or, without
+ * one, of the molecule, as ovoid_field_export() does. Which atoms an ellipsoid stands for is what
+ * ovoid_model_owner() says, where it has as many entries as the molecule atoms; else an atom counts
+ * for the ellipsoid with the largest value at its centre. */
+OVOID_API ovoid_status ovoid_scene_export(ovoid_context *context, const ovoid_scene *scene,
                                           const char *path, const ovoid_export_options *options);
 
 /* Name of a format as ovoid_export_format_find() takes it, "bild" for example; NULL for others. */

@@ -154,14 +154,27 @@ typedef struct ovoid_residue { /* 32 bytes */
 } ovoid_residue;
 
 /* One entry per atom, in the order of ovoid_molecule_xyzr(); of an assembly one per atom of the
- * unit, see ovoid_molecule_origin(). NULL where the file says nothing of its atoms but place and
- * radius: XYZR, and molecules from memory. */
+ * unit, see ovoid_molecule_origin(). NULL where nobody says anything of the atoms but place and
+ * radius: XYZR, and ovoid_molecule_create(). */
 OVOID_API const ovoid_atom *ovoid_molecule_identity(const ovoid_molecule *molecule);
 
 /* Residues in the order of their atoms (of the unit), *count of them; one whose atoms are not
  * together is there more than once. NULL and 0 where there is no identity. */
 OVOID_API const ovoid_residue *ovoid_molecule_residues(const ovoid_molecule *molecule,
                                                        size_t *count);
+
+/* As ovoid_molecule_create(), of atoms that are known: identity has `atoms` entries, and residues
+ * residue_count (both copied, what they do not fill being 0). The atoms of a residue follow one
+ * another, in the order of the residues, and each has one at least; `first` and
+ * OVOID_ATOM_GUESSED_RADIUS are found here. OVOID_RADII_OWN takes the radii of xyzr; all others
+ * replace them, as for a structure's file: DEFAULT is UNITED where there are no hydrogens, else
+ * BONDI, and FILE needs radii_file, which is NULL otherwise. */
+OVOID_API ovoid_status ovoid_molecule_create_known(ovoid_context *context, const double *xyzr,
+                                                   const ovoid_atom *identity, size_t atoms,
+                                                   const ovoid_residue *residues,
+                                                   size_t residue_count, ovoid_radii radii,
+                                                   const char *radii_file,
+                                                   ovoid_molecule **molecule);
 
 /* Atoms whose radius had to be guessed, by kind. */
 typedef struct ovoid_guess { /* 40 bytes */

@@ -14,7 +14,7 @@
  *   fit.h       from a molecule to a model     picture.h  pictures
  *   field.h     fields, and their values       export.h   files for other programs
  *   fitter.h    from a molecule to many models, and along a trajectory
- *   file.h      output files
+ *   file.h      output files                   selftest.h whether a device computes rightly
  *
  * Conventions of every function:
  * - Lengths are in angstrom, areas in angstrom^2, decay rates in angstrom^-2, angles in radian,
@@ -71,5 +71,6 @@
 #include "ovoid/model.h"
 #include "ovoid/molecule.h"
 #include "ovoid/picture.h"
+#include "ovoid/selftest.h"
 
 #endif

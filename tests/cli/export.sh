@@ -14,14 +14,14 @@ for command in "export --help" "export -h" "help export"; do
     expect_code 0
     expect_silent
     for text in "Usage: ovoid export INPUT" "Exit codes:" "Examples:" "OVOID_DEVICE" ".bild" ".cxc" \
-        ".py" ".gmm" ".json" ".mrc" ".dx" --output --as --format --device --quiet --isovalue \
+        ".py" ".gmm" ".json" ".xyz" ".lmp" ".pdb" ".gltf" ".cif" ".mrc" ".dx" ".html" --output --as --format --device --quiet --isovalue \
         --spacing --decay --colour --opacity; do
         expect_out "$text"
     done
 done
 
 # Ellipsoids need no device.
-for name in m.bild m.cxc m.py m.gmm m.json; do
+for name in m.bild m.cxc m.py m.gmm m.json m.xyz m.lmp m.pdb m.gltf m.cif; do
     run env OVOID_DEVICE="no such device" "$OVOID" export m.ovoid -o $name
     expect_code 0
     expect_silent
@@ -33,7 +33,12 @@ expect_code 0
 expect_no_out
 grep -q 'color #ff800000 ' m.cxc || fail "colour and opacity should be as asked"
 grep -q 'at isovalue 2$' m.cxc || fail "the isovalue should be as asked"
-expect_files a.xyzr m.ovoid m.bild m.cxc m.py m.gmm m.json
+expect_files a.xyzr m.ovoid m.bild m.cxc m.py m.gmm m.json m.xyz m.lmp m.pdb m.gltf m.cif
+rm m.xyz m.lmp m.pdb m.gltf m.cif
+run "$OVOID" export a.xyzr m.ovoid -o m.cif
+expect_code 0
+expect_out "a.xyzr: 6 atoms, 2 ellipsoids, written to m.cif as ihm"
+rm m.cif
 
 # Standard streams; a model is known by its first line, whatever its name.
 cp m.ovoid other.txt
@@ -61,11 +66,13 @@ wrong() {
 }
 wrong 2 "which model?"
 wrong 2 "one input at a time, but 'b' follows 'm.ovoid'" m.ovoid b -o m.py
+wrong 2 "a molecule and one model at a time, but 'n.ovoid' follows 'm.ovoid'" a.xyzr m.ovoid n.ovoid -o m.cif
+wrong 2 "only one input can come from standard input" - - -o m.html
 wrong 2 "where to?" m.ovoid
 wrong 2 "are the same file" m.ovoid -o ./m.ovoid
-wrong 2 "one of .bild, .cxc, .py, .gmm, .json, .mrc, .map, .ccp4, .dx" m.ovoid -o m.pdb
+wrong 2 "one of .bild, .cxc, .py, .gmm, .json, .xyz, .lmp, .pdb, .gltf, .cif, .mrc, .map, .ccp4, .dx, .html" m.ovoid -o m.xtc
 wrong 2 "name a format" m.ovoid -o -
-wrong 2 "--as takes bild, cxc, pymol, gmm, json, ccp4 or dx, not 'pdb'" m.ovoid -o - --as pdb
+wrong 2 "--as takes bild, cxc, pymol, gmm, json, ccp4, dx, html, ihm, xyz, lammps, anisou or splat, not 'xtc'" m.ovoid -o - --as xtc
 wrong 2 "--colour takes six hexadecimal digits such as 4d8ccc, not 'red'" m.ovoid -o m.py --color red
 wrong 2 "--opacity is 2, but must be at most 1" m.ovoid -o m.py --opacity 2
 for name in r.mrc r.MRC r.dx r.py; do
@@ -117,6 +124,33 @@ grep -aq 'field of 6 atoms, decay 0.4 ' a.mrc || fail "the map should say what i
 code=$?
 expect_code 0
 cmp -s a.mrc b.mrc || fail "standard input should be as the file"
+
+# A page of a molecule, of models, of both; the device is asked for, and a full disk is no page.
+for inputs in a.xyzr m.ovoid "a.xyzr m.ovoid" "m.ovoid m.ovoid" "a.xyzr m.ovoid m.ovoid"; do
+    run "$OVOID" export $inputs -o a.html --spacing 1
+    expect_code 0
+    expect_silent
+    expect_out " written to a.html as html"
+done
+expect_out "a.xyzr: 6 atoms, 2 / 2 ellipsoids, written"
+"$OVOID" export - m.ovoid m.ovoid --format xyzr --as html --spacing 1 -o - <a.xyzr >b.html 2>"$err"
+code=$?
+expect_code 0
+expect_silent
+grep -q '"atoms":6' b.html || fail "standard input should be the molecule"
+[ "$(grep -c octet-stream b.html)" -eq "$(grep -c octet-stream a.html)" ] || fail "the same blocks"
+run "$OVOID" export m.ovoid a.xyzr -o x.html
+expect_code 3
+expect_err "a.xyzr"
+run "$OVOID" export a.xyzr m.ovoid -o x.html --device "no such device"
+expect_code 5
+if [ -w /dev/full ]; then
+    run "$OVOID" export a.xyzr m.ovoid -o /dev/full --as html --spacing 1
+    expect_code 4
+    expect_err "No space left on device"
+fi
+[ ! -e x.html ] || fail "what failed should leave nothing"
+rm a.html b.html
 
 # What is appended to, like a pipe, cannot be gone back in: the map follows what was there.
 cp a.mrc c.mrc

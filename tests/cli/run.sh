@@ -6,6 +6,7 @@ CHECK_REPORT=$3
 CHECK_MEASURES=$4
 here=$(cd "$(dirname "$0")" && pwd)
 place=$(mktemp -d "${TMPDIR:-/tmp}/ovoid-cli-XXXXXX") || exit 1
+export OVOID_SELFTEST="${OVOID_SELFTEST-off}" # by itself it is selftest.sh's
 out=$place/out
 err=$place/err
 mkdir "$place/work" && cd "$place/work" || exit 1

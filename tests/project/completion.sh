@@ -85,7 +85,7 @@ expect 'e.ply' mesh -o e
 expect 'n.glb|n.obj|n.off|n.ply|n.stl' mesh -o n.
 expect 'n.obj|n.off' mesh --output n.o
 expect 'n.png' render a.pdb -o n.
-expect 'n.ccp4|n.cxc' export -o n.c
+expect 'n.ccp4|n.cif|n.cxc' export -o n.c
 endings=$(sed -n 's/.*molecules\[\] = {\(.*\)};.*/\1/p' "$input" | tr -d '",.')
 [[ -n $endings ]] || { echo "$input: where are the endings of molecules?"; status=1; }
 for ending in $endings; do

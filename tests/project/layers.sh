@@ -32,7 +32,7 @@ find . -name '*.c' -o -name '*.h' -o -name '*.cpp' | LC_ALL=C sort | xargs awk -
         level(6, "measure picture")
         level(7, "fit/l1 fit/adaptive")
         level(8, "fit")
-        level(9, "write")
+        level(9, "write selftest")
         level(10, "cli")
     }
     function room_of(path) {

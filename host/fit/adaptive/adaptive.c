@@ -2,19 +2,10 @@
 
 #include "base/progress.h"
 
+#include "fit/adaptive/constants.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Volumes are made equal to this relative error, in so many steps at most. */
-#define VOLUME_ERROR 1e-4
-#define CALIBRATIONS 5
-#define CALIBRATION_MOST 0.2 /* of ln a at once */
-/* Of the points of a molecule of so many atoms or fewer (angstrom). */
-#define SPACING_SMALL 0.35
-#define ATOMS_SMALL 40.0
-/* How far the band may reach beyond an atom's own surface, in units of 1 / sqrt(2 d). */
-#define FIELD_PADDING 2.5
 
 static bool report_sampling(uint64_t points, void *user) {
     ov_adaptive *const f = user;
@@ -25,8 +16,8 @@ static bool report_sampling(uint64_t points, void *user) {
 /* Small molecules have few points at any spacing, and so few that more of them help. The field of
  * a larger decay rate has smaller features; that of a smaller one has fewer, and as many points. */
 static double default_spacing(size_t atoms, double decay) {
-    const double small = SPACING_SMALL * pow((double)atoms / ATOMS_SMALL, 0.25);
-    return fmin(fmax(small, SPACING_SMALL), OVOID_DEFAULT_SPACING_ADAPTIVE) *
+    const double small = ov_tuned.sample_spacing * pow((double)atoms / ov_tuned.sample_atoms, 0.25);
+    return fmin(fmax(small, ov_tuned.sample_spacing), OVOID_DEFAULT_SPACING_ADAPTIVE) *
            fmin(1.0, sqrt(0.5 / decay));
 }
 
@@ -38,7 +29,7 @@ static double padding_of(const ov_adaptive *f) {
         radius = fmax(radius, f->xyzr[4 * i + 3]);
     const double reach = radius * radius - log(options->isovalue) / options->decay;
     return fmax(options->padding,
-                sqrt(fmax(reach, 0.0)) + FIELD_PADDING / sqrt(2.0 * options->decay));
+                sqrt(fmax(reach, 0.0)) + ov_tuned.sample_padding / sqrt(2.0 * options->decay));
 }
 
 static ovoid_status sample(ov_adaptive *f, const ov_target_options *targets) {
@@ -112,7 +103,7 @@ static void multiply_amplitudes(ov_adaptive *f, size_t count, double factor) {
 static double log_calibration(const ov_adaptive *f, double volume_ratio, double per_log) {
     const double step = per_log > 0.0 ? (1.0 - volume_ratio) / per_log
                                       : log(ov_judge_amplitude_factor(&f->judge, volume_ratio));
-    return fmin(fmax(step, -CALIBRATION_MOST), CALIBRATION_MOST);
+    return fmin(fmax(step, -ov_tuned.volume_change), ov_tuned.volume_change);
 }
 
 /* Distances only matter on the way where a tolerance may be lost. */
@@ -129,8 +120,8 @@ static ovoid_status calibrate(ov_adaptive *f, size_t count, ov_judgement *judgem
     const ovoid_adaptive_options *const wanted = &f->options->adaptive;
     double per_log = 0.0;
     OV_TRY(judge_volume(f, count, judgement));
-    for (int n = 0; n < CALIBRATIONS && judgement->valid && wanted->steps > 0 &&
-                    fabs(judgement->volume_ratio - 1.0) > VOLUME_ERROR;
+    for (uint32_t n = 0; n < ov_tuned.volume_steps && judgement->valid && wanted->steps > 0 &&
+                         fabs(judgement->volume_ratio - 1.0) > ov_tuned.volume_error;
          ++n) {
         const double step = log_calibration(f, judgement->volume_ratio, per_log);
         ov_judgement after;
@@ -306,6 +297,8 @@ static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const
     f->held = NULL;
     f->steps = 0;
     f->misfit = 0.0;
+    f->expected = 0.0;
+    f->width_max = ov_tuned.refine_width * sqrt(0.5 / options->decay);
     f->solver_before = ov_adaptive_solver_iterations(f);
     ov_refiner_forget(&f->refiner);
 }

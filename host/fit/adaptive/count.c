@@ -1,12 +1,9 @@
 #include "fit/adaptive/parts.h"
 
+#include "fit/adaptive/constants.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Repairs: the share of ellipsoids that is split and merged back at first, and how many rounds. */
-#define REPAIR_SHARE 0.08
-#define REPAIRS_PER_EFFORT 4
 
 /* Splits where the misfit is largest, and merges as many elsewhere. */
 static ovoid_status repair_once(ov_adaptive *f, const ov_trial *from, size_t skip, size_t more,
@@ -36,7 +33,7 @@ cleanup:
 static ovoid_status repair(ov_adaptive *f, ov_trial *best, uint32_t rounds) {
     ovoid_status status = OVOID_OK;
     ov_trial other = {0};
-    double share = REPAIR_SHARE;
+    double share = ov_tuned.count_repair_share;
     size_t skip = 0;
     OV_TRY(ov_trial_create(f, &other));
     for (uint32_t n = 0; n < rounds && best->count > 1 && skip < best->count; ++n) {
@@ -67,17 +64,14 @@ static ovoid_status fit_window(ov_adaptive *f, size_t count, size_t window, ov_t
     if (effort == 1)
         goto cleanup;
     OV_TRY(ov_adaptive_judge(f, best));
-    OV_TRY(repair(f, best, REPAIRS_PER_EFFORT * (effort - 1)));
+    OV_TRY(repair(f, best, ov_tuned.count_repairs * (effort - 1)));
 cleanup:
     return status;
 }
 
-/* A start of fewer or more than so many times as many is not worth its while. */
-#define START_TIMES 2
-
 static bool is_near(const ov_adaptive *f, size_t count) {
-    return f->start && f->start->count <= START_TIMES * count &&
-           count <= START_TIMES * f->start->count;
+    return f->start && f->start->count <= ov_tuned.warm_times * count &&
+           count <= ov_tuned.warm_times * f->start->count;
 }
 
 /* From the model given: at its own count, never worse than that. */
@@ -98,15 +92,30 @@ static ovoid_status fit_start(ov_adaptive *f, size_t count, ov_trial *best) {
     OV_TRY(ov_adaptive_judge(f, &other));
     if (!keeps || other.judgement.score < best->judgement.score)
         ov_trial_swap(&other, best);
-    OV_TRY(repair(f, best, REPAIRS_PER_EFFORT * (f->options->adaptive.effort - 1)));
+    OV_TRY(repair(f, best, ov_tuned.count_repairs * (f->options->adaptive.effort - 1)));
 cleanup:
     ov_trial_destroy(&other);
     return status;
 }
 
+/* Takes note of what can be expected of so many ellipsoids, if that is little. */
+static void expect(ov_adaptive *f, size_t count) {
+    const double most = ov_tuned.start_ratio * (double)f->atoms *
+                        pow(f->options->decay / 0.5, ov_tuned.start_decay_power);
+    const double distance = pow((double)count / most, 1.0 / ov_tuned.start_tolerance_power) *
+                            sqrt(2.0 * f->options->decay);
+    const double width = ov_tuned.coarse_width * cbrt((double)f->atoms / (double)count) *
+                         sqrt(0.5 / f->options->decay);
+    if (distance <= ov_tuned.coarse_distance)
+        return;
+    f->expected = distance;
+    f->width_max = fmin(f->width_max, width);
+}
+
 ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     ov_trial other = {0};
+    expect(f, count);
     if (is_near(f, count)) {
         OV_TRY(fit_start(f, count, best));
         if (best->count == count)

@@ -1,26 +1,10 @@
+#include "fit/adaptive/constants.h"
 #include "fit/adaptive/reach.h"
 #include "fit/adaptive/tolerance.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Spots that are acted on at once: this share of the ellipsoids, the worst ones. */
-#define SHARE 0.3
-/* A spot this near to a place that was met before (angstrom) is that place again. */
-#define SAME_PLACE 3.0
-/* What is done at a place by how often it was met before: at first its largest ellipsoid is split,
- * then its two largest; from REBUILT on the ellipsoids that matter there are made anew from their
- * atoms, REBUILD times as many; from ATOMS on they are their atoms, further about each time. */
-#define SPLIT_TWO 2
-#define REBUILT 3
-#define ATOMS 6
-#define LAST 12
-#define REBUILD 1.5
-/* An ellipsoid matters at a spot where its value is at least this share of the isovalue, when it is
- * rebuilt, and when it is refined. */
-#define MATTERS 0.05
-#define REFINED 3e-3
 
 /* What growing works with. */
 typedef struct growth {
@@ -66,9 +50,12 @@ static ovoid_status split(ov_adaptive *f, ov_trial *t, const ov_spots *spots, gr
     const size_t whole = t->count;
     memset(f->twin, 0xff, f->capacity * sizeof *f->twin);
     memset(g->chosen, 0, f->capacity * sizeof *g->chosen);
-    OV_TRY(ov_reach_create(f->context, t->x, whole, log(MATTERS * f->options->isovalue), &reach));
+    OV_TRY(ov_reach_create(f->context, t->x, whole,
+                           log(ov_tuned.grow_matters * f->options->isovalue), &reach));
     for (size_t n = 0; n < spots->count; ++n) {
-        const int each = g->before[n] < SPLIT_TWO ? 1 : g->before[n] < REBUILT ? 2 : 0;
+        const int each = g->before[n] < ov_tuned.grow_split_two ? 1
+                         : g->before[n] < ov_tuned.grow_rebuild ? 2
+                                                                : 0;
         for (int k = 0; k < each && t->count < f->atoms; ++k) {
             const size_t i = ellipsoid_at(&reach, g->chosen, spots->spot[n].at, g->felt);
             if (i == whole)
@@ -107,10 +94,14 @@ static ovoid_status rebuild(ov_adaptive *f, ov_trial *t, const ov_spots *spots, 
     uint32_t longest = 0;
     for (size_t n = 0; n < spots->count; ++n)
         longest = g->before[n] > longest ? g->before[n] : longest;
-    for (uint32_t met = REBUILT; met <= LAST && met <= longest; ++met) {
-        const double share = met < ATOMS ? MATTERS : MATTERS * pow(0.25, met - ATOMS);
-        OV_TRY(choose(f, t, spots, met, met == LAST ? UINT32_MAX : met, share, g));
-        OV_TRY(ov_adaptive_rebuild(f, t, met < ATOMS ? REBUILD : (double)f->atoms, g->chosen));
+    for (uint32_t met = ov_tuned.grow_rebuild; met <= ov_tuned.grow_last && met <= longest; ++met) {
+        const double share = met < ov_tuned.grow_atoms
+                                 ? ov_tuned.grow_matters
+                                 : ov_tuned.grow_matters * pow(0.25, met - ov_tuned.grow_atoms);
+        OV_TRY(choose(f, t, spots, met, met == ov_tuned.grow_last ? UINT32_MAX : met, share, g));
+        OV_TRY(ov_adaptive_rebuild(
+            f, t, met < ov_tuned.grow_atoms ? ov_tuned.grow_rebuild_times : (double)f->atoms,
+            g->chosen));
     }
 cleanup:
     return status;
@@ -121,11 +112,11 @@ static ovoid_status act(ov_adaptive *f, const char *stage, ov_trial *t, const ov
                         growth *g) {
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_adaptive_emphasise(f, spots));
-    OV_TRY(ov_places_meet(f->context, &g->places, spots, SAME_PLACE, g->before));
+    OV_TRY(ov_places_meet(f->context, &g->places, spots, ov_tuned.spots_same, g->before));
     OV_TRY(rebuild(f, t, spots, g));
     OV_TRY(split(f, t, spots, g));
-    OV_TRY(choose(f, t, spots, 0, UINT32_MAX, REFINED, g));
-    OV_TRY(ov_adaptive_refine_some(f, t, stage, OV_LOCAL_STEPS, g->chosen));
+    OV_TRY(choose(f, t, spots, 0, UINT32_MAX, ov_tuned.grow_refined, g));
+    OV_TRY(ov_adaptive_refine_some(f, t, stage, ov_tuned.refine_local_steps, g->chosen));
     OV_TRY(ov_adaptive_share_atoms(f, t));
     OV_TRY(ov_adaptive_sort(f, t));
 cleanup:
@@ -142,8 +133,8 @@ ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    for (int n = 0; n < how->rounds && spots->count > 0 && t->count <= how->most; ++n) {
-        const size_t share = (size_t)(SHARE * (double)t->count) + 1;
+    for (uint32_t n = 0; n < how->rounds && spots->count > 0 && t->count <= how->most; ++n) {
+        const size_t share = (size_t)(ov_tuned.grow_share * (double)t->count) + 1;
         spots->count = spots->count < share ? spots->count : share;
         OV_TRY(act(f, how->stage, t, spots, &g));
         OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, spots));

@@ -1,13 +1,9 @@
 #include "fit/adaptive/local.h"
 
+#include "fit/adaptive/constants.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* How far (angstrom) ellipsoids may move before the points that matter to them are looked for
- * again.
- */
-#define REACH_SKIN 1.0f
 
 /* ---- who moves, and who does not ------------------------------------------------------------ */
 
@@ -29,7 +25,7 @@ static ovoid_status set_terms(ov_local *l, const ov_target *target, const double
             ov_factor_quadric(x + i * OV_FACTOR_PARAMETERS, &quadrics[taken++]);
         }
     OV_TRY(ov_terms_set_skins(context, terms, quadrics, skins, taken, target->points->origin,
-                              OV_REFINE_CUTOFF));
+                              ov_tuned.refine_cutoff));
 cleanup:
     free(quadrics);
     free(skins);
@@ -132,7 +128,7 @@ static bool escaped(const double *x, size_t count, void *where) {
     for (size_t i = 0; i < count && !m->escaped; ++i)
         m->escaped =
             ov_factor_motion(m->found + i * OV_FACTOR_PARAMETERS, x + i * OV_FACTOR_PARAMETERS,
-                             OV_REFINE_CUTOFF) > (double)REACH_SKIN;
+                             ov_tuned.refine_cutoff) > ov_tuned.refine_local_skin;
     return m->escaped;
 }
 
@@ -140,7 +136,8 @@ static bool escaped(const double *x, size_t count, void *where) {
 static ovoid_status find_part(ov_local *l, const ov_target *target, const double *x, size_t count,
                               const bool *chosen) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(set_terms(l, target, x, count, chosen, true, REACH_SKIN, &l->moving));
+    OV_TRY(set_terms(l, target, x, count, chosen, true, (float)ov_tuned.refine_local_skin,
+                     &l->moving));
     OV_TRY(find_packs(l, target->points));
     if (l->packs.count == 0)
         goto cleanup;

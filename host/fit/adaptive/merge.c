@@ -1,4 +1,5 @@
 #include "fit/adaptive/merge.h"
+#include "fit/adaptive/constants.h"
 #include "mixture/component.h"
 #include "model/ellipsoid.h"
 #include "neighbours/neighbours.h"
@@ -6,15 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Least phi~ among which a misfit is shared out. */
-#define SHARED_MIN 1e-3f
-/* Partners of one ellipsoid that are tried: those whose merge costs least in L2 distance. */
-#define PARTNERS 6
-/* Centres further apart than this (angstrom) are no partners. */
-#define REACH 12.0
-/* Place of a split's halves: this share of the standard deviation along the longest axis. */
-#define SPLIT_OFFSET 0.6
 
 typedef struct candidate {
     uint32_t i, j;
@@ -35,25 +27,25 @@ static int by_loss(const void *a, const void *b) {
     return by_pair(a, b);
 }
 
-/* The partners of ellipsoid i, cheapest first; returns how many. */
+/* The partners of ellipsoid i, cheapest first; cost has room for theirs. Returns how many. */
 static size_t partners_of(const ov_component *components, size_t i, const uint32_t *near,
-                          size_t near_count, candidate *best) {
-    double cost[PARTNERS];
+                          size_t near_count, double *cost, candidate *best) {
+    const size_t most = ov_tuned.merge_partners;
     size_t found = 0;
     for (size_t n = 0; n < near_count; ++n) {
         const size_t j = near[n];
         if (j == i)
             continue;
         const double own = ov_component_cost(OV_MERGE_L2, &components[i], &components[j]);
-        size_t at = found < PARTNERS ? found++ : PARTNERS;
+        size_t at = found < most ? found++ : most;
         while (at > 0 && cost[at - 1] > own) {
-            if (at < PARTNERS) {
+            if (at < most) {
                 cost[at] = cost[at - 1];
                 best[at] = best[at - 1];
             }
             --at;
         }
-        if (at < PARTNERS) {
+        if (at < most) {
             cost[at] = own;
             best[at] = i < j ? (candidate){(uint32_t)i, (uint32_t)j, 0.0f}
                              : (candidate){(uint32_t)j, (uint32_t)i, 0.0f};
@@ -69,13 +61,18 @@ static ovoid_status list_candidates(ovoid_context *context, const ov_component *
     ov_grid grid = {0};
     uint32_t near[2 * OV_NEAR_MAX];
     size_t found = 0, kept = 0;
-    candidate *const made = ov_alloc(context, count * PARTNERS, sizeof *made, "pairs");
-    if (!made)
-        return OVOID_ERROR_MEMORY;
-    OV_TRY(ov_grid_of(context, components->mean, sizeof *components, count, REACH, &grid));
+    candidate *const made =
+        ov_alloc(context, count * ov_tuned.merge_partners, sizeof *made, "pairs");
+    double *const cost = ov_alloc(context, ov_tuned.merge_partners, sizeof *cost, "costs");
+    if (!made || !cost) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    OV_TRY(ov_grid_of(context, components->mean, sizeof *components, count, ov_tuned.merge_reach,
+                      &grid));
     for (size_t i = 0; i < count; ++i) {
         const size_t near_count = ov_grid_near(&grid, components[i].mean, UINT32_MAX, near);
-        found += partners_of(components, i, near, near_count, made + found);
+        found += partners_of(components, i, near, near_count, cost, made + found);
     }
     qsort(made, found, sizeof *made, by_pair);
     for (size_t n = 0; n < found; ++n)
@@ -83,6 +80,7 @@ static ovoid_status list_candidates(ovoid_context *context, const ov_component *
             made[kept++] = made[n];
 cleanup:
     ov_grid_destroy(&grid);
+    free(cost);
     if (status != OVOID_OK)
         free(made);
     else {
@@ -111,7 +109,7 @@ static ovoid_status upload_pairs(ov_refiner *r, ov_merger *m, const ov_target *t
         ov_quadric_of_component(&both, &merged[n]);
     }
     OV_TRY(ov_terms_set(r->context, &m->merged, merged, listed, target->points->origin,
-                        OV_REFINE_CUTOFF));
+                        ov_tuned.refine_cutoff));
     OV_TRY(ov_buffer_put(r->context, &m->pairs, pairs, 2 * listed * sizeof *pairs, "pairs"));
 cleanup:
     free(pairs);
@@ -298,7 +296,9 @@ static ovoid_status upload_blame(ov_refiner *r, ov_merger *m, size_t points) {
     OV_TRY(ov_buffer_read(r->context, &r->now.active, 0, weight, points * sizeof *weight));
     OV_TRY(ov_buffer_read(r->context, &r->now.value, 0, value, points * sizeof *value));
     for (size_t k = 0; k < points; ++k)
-        u[k] = weight[k] > 0.0f ? u[k] * (u[k] / weight[k]) / fmaxf(value[k], SHARED_MIN) : 0.0f;
+        u[k] = weight[k] > 0.0f
+                   ? u[k] * (u[k] / weight[k]) / fmaxf(value[k], (float)ov_tuned.merge_shared)
+                   : 0.0f;
     OV_TRY(ov_buffer_put(r->context, &m->u, u, points * sizeof *u, "residuals"));
 cleanup:
     free(u);
@@ -333,13 +333,13 @@ void ov_split(double whole[OV_FACTOR_PARAMETERS], double other[OV_FACTOR_PARAMET
     ov_ellipsoid_of_quadric(&quadric, &half);
     ov_rotation(half.angle, r);
     const double deviation = 1.0 / sqrt(2.0 * half.decay[2]); /* decay rates descend */
-    const double shrink = 1.0 - SPLIT_OFFSET * SPLIT_OFFSET;  /* of the variance */
+    const double shrink = 1.0 - ov_tuned.merge_split * ov_tuned.merge_split; /* of the variance */
     memcpy(centre, half.centre, sizeof centre);
     half.decay[2] /= shrink;
     half.amplitude *= 0.5 / sqrt(shrink);
     for (int side = -1; side <= 1; side += 2) {
         for (int k = 0; k < 3; ++k)
-            half.centre[k] = centre[k] + side * SPLIT_OFFSET * deviation * r[2][k];
+            half.centre[k] = centre[k] + side * ov_tuned.merge_split * deviation * r[2][k];
         ov_quadric_of_ellipsoid(&half, &quadric);
         ov_factor_of_quadric(&quadric, side < 0 ? whole : other);
     }

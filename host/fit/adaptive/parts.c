@@ -2,25 +2,27 @@
 
 #include "base/progress.h"
 
+#include "fit/adaptive/constants.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* The ways to merge that are tried, in this order: which one wins differs by molecule. */
-static const ov_reduction_options starts[OV_STARTS] = {
-    {OV_MERGE_RUNNALLS, 5.0, 0.0},    {OV_MERGE_L2, 5.0, 0.0},
-    {OV_MERGE_L2_PER_MASS, 5.0, 6.0}, {OV_MERGE_RUNNALLS, 5.0, 6.0},
-    {OV_MERGE_L2_PER_MASS, 5.0, 0.0}, {OV_MERGE_L2, 5.0, 6.0},
+static const struct {
+    ov_merge_cost cost;
+    bool inside_first;
+} starts[OV_STARTS] = {
+    {OV_MERGE_RUNNALLS, false}, {OV_MERGE_L2, false},          {OV_MERGE_L2_PER_MASS, true},
+    {OV_MERGE_RUNNALLS, true},  {OV_MERGE_L2_PER_MASS, false}, {OV_MERGE_L2, true},
 };
 
-/* Windows about the surface that are tried, the first one at any effort: a narrow one makes areas
- * better, a wide one distances. Lengths in angstrom for d = 0.5. */
-static const struct {
-    double width, floor;
-} windows[OV_WINDOWS] = {{0.5, 0.05}, {0.3, 0.02}, {0.5, 0.15}};
-
-/* Those that are refined alone are at most this share of all. */
-#define SOME_MOST 0.5
+static ov_reduction_options merging(size_t kind) {
+    return (ov_reduction_options){
+        .cost = starts[kind].cost,
+        .reach = ov_tuned.atoms_reach,
+        .inside = starts[kind].inside_first ? ov_tuned.atoms_inside : 0.0,
+    };
+}
 
 ovoid_status ov_trial_create(const ov_adaptive *f, ov_trial *t) {
     *t = (ov_trial){
@@ -78,31 +80,29 @@ static bool report_step(uint32_t step, double misfit, void *user) {
 
 /* ---- parts ---------------------------------------------------------------------------------- */
 
-/* The longest axis, as 1 / sqrt(decay rate), that a step may make (angstrom). */
-#define WIDTH_MAX 50.0
-
 void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t) {
     for (size_t i = 0; i < t->count; ++i)
         ov_factor_quadric(t->x + i * OV_FACTOR_PARAMETERS, &f->quadrics[i]);
 }
 
-static ov_refine_options refine_options(ov_adaptive *f, uint32_t steps, double tolerance,
-                                        double decrease) {
+static ov_refine_options refine_options(ov_adaptive *f, uint32_t steps, double decrease) {
+    const bool coarse = f->expected > 0.0;
     return (ov_refine_options){
         .steps = steps < f->options->adaptive.steps ? steps : f->options->adaptive.steps,
-        .solver_steps = 25,
-        .solver_tolerance = tolerance,
-        .decrease = decrease,
-        .damping = 1e-2,
-        .width_max = WIDTH_MAX * sqrt(0.5 / f->options->decay),
+        .solver_steps = ov_tuned.refine_solver_steps,
+        .solver_tolerance =
+            coarse ? ov_tuned.coarse_solver_tolerance : ov_tuned.refine_solver_tolerance,
+        .decrease = coarse ? fmax(decrease, ov_tuned.coarse_gain) : decrease,
+        .damping = ov_tuned.refine_damping,
+        .width_max = f->width_max,
         .go_on = report_step,
         .user = f,
     };
 }
 
 ovoid_status ov_adaptive_refine(ov_adaptive *f, ov_trial *t, const char *stage, uint32_t steps,
-                                double tolerance, double decrease) {
-    const ov_refine_options options = refine_options(f, steps, tolerance, decrease);
+                                double decrease) {
+    const ov_refine_options options = refine_options(f, steps, decrease);
     f->stage = stage;
     f->count = t->count;
     return ov_refine(&f->refiner, &f->target, &options, t->x, t->count, &t->misfit);
@@ -110,24 +110,24 @@ ovoid_status ov_adaptive_refine(ov_adaptive *f, ov_trial *t, const char *stage, 
 
 ovoid_status ov_adaptive_refine_some(ov_adaptive *f, ov_trial *t, const char *stage, uint32_t steps,
                                      const bool *chosen) {
-    const ov_refine_options options = refine_options(f, steps, 1e-1, 1e-5);
+    const ov_refine_options options = refine_options(f, steps, ov_tuned.refine_local_gain);
     size_t some = 0;
     double misfit;
     for (size_t i = 0; i < t->count; ++i)
         some += chosen[i];
-    if ((double)some > SOME_MOST * (double)t->count)
-        return ov_adaptive_refine(f, t, stage, steps, 1e-1, 1e-5);
+    if ((double)some > ov_tuned.refine_local_most * (double)t->count)
+        return ov_adaptive_refine(f, t, stage, steps, ov_tuned.refine_local_gain);
     f->stage = stage;
     f->count = t->count;
     return ov_refine_some(&f->local, &f->target, &options, t->x, t->count, chosen, &misfit);
 }
 
 ovoid_status ov_adaptive_refine_fully(ov_adaptive *f, ov_trial *t, const char *stage) {
-    return ov_adaptive_refine(f, t, stage, UINT32_MAX, 1e-1, 1e-3);
+    return ov_adaptive_refine(f, t, stage, UINT32_MAX, ov_tuned.refine_gain);
 }
 
 ovoid_status ov_adaptive_refine_quickly(ov_adaptive *f, ov_trial *t, const char *stage) {
-    return ov_adaptive_refine(f, t, stage, 6, 1e-1, 1e-2);
+    return ov_adaptive_refine(f, t, stage, ov_tuned.refine_quick_steps, ov_tuned.refine_quick_gain);
 }
 
 ovoid_status ov_adaptive_share_atoms(ov_adaptive *f, ov_trial *t) {
@@ -140,18 +140,19 @@ ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t) {
     return ov_judge_model(&f->judge, f->quadrics, t->count, &t->judgement);
 }
 
-const ov_reduction_options *ov_adaptive_merging(void) {
-    return &starts[0];
+ov_reduction_options ov_adaptive_merging(void) {
+    return merging(0);
 }
 
 ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial *t) {
     ovoid_status status = OVOID_OK;
+    const ov_reduction_options options = merging(kind);
     f->stage = "merge";
     if (!f->reduction[kind]) {
         ov_progress_stage(f->context, f->stage);
         for (size_t i = 0; i < f->atoms; ++i)
             ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &f->quadrics[i]);
-        OV_TRY(ov_reduction_create(f->context, f->quadrics, f->atoms, 1, &starts[kind],
+        OV_TRY(ov_reduction_create(f->context, f->quadrics, f->atoms, 1, &options,
                                    &f->reduction[kind]));
     }
     OV_TRY(ov_reduction_cut(f->context, f->reduction[kind], count, f->quadrics, t->owner));
@@ -172,6 +173,12 @@ void ov_adaptive_drop_reductions(ov_adaptive *f) {
         ov_reduction_destroy(&f->reduction[k]);
 }
 
+/* Far enough to tell a good start from a bad one. */
+static ovoid_status compare(ov_adaptive *f, ov_trial *t) {
+    return ov_adaptive_refine(f, t, "refine", ov_tuned.count_start_steps,
+                              ov_tuned.count_start_gain);
+}
+
 /* The best of the first `kinds` starts after a few steps each, refined to the end. */
 static ovoid_status start(ov_adaptive *f, size_t kinds, size_t count, ov_trial *best) {
     ovoid_status status = OVOID_OK;
@@ -182,10 +189,10 @@ static ovoid_status start(ov_adaptive *f, size_t kinds, size_t count, ov_trial *
     if (f->options->adaptive.goal != OVOID_GOAL_TOLERANCE && !f->held)
         f->held = best; /* so many it are, and each step makes them better */
     if (kinds > 1)
-        OV_TRY(ov_adaptive_refine(f, best, "refine", 12, 1e-1, 3e-3));
+        OV_TRY(compare(f, best));
     for (size_t kind = 1; kind < kinds; ++kind) {
         OV_TRY(ov_adaptive_cut(f, kind, count, &other));
-        OV_TRY(ov_adaptive_refine(f, &other, "refine", 12, 1e-1, 3e-3));
+        OV_TRY(compare(f, &other));
         if (other.misfit < best->misfit)
             ov_trial_swap(&other, best);
     }
@@ -211,7 +218,14 @@ cleanup:
 
 ovoid_status ov_adaptive_aim(ov_adaptive *f, size_t window) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(ov_target_window(f->context, &f->target, windows[window].width, windows[window].floor));
+    const struct {
+        double width, floor;
+    } windows[OV_WINDOWS] = {{ov_tuned.target_window, ov_tuned.target_floor},
+                             {ov_tuned.count_window_narrow, ov_tuned.count_floor_narrow},
+                             {ov_tuned.count_window_wide, ov_tuned.count_floor_wide}};
+    const double wide = fmin(ov_tuned.coarse_window * f->expected, ov_tuned.coarse_window_max);
+    OV_TRY(ov_target_window(f->context, &f->target, fmax(windows[window].width, wide),
+                            windows[window].floor));
     OV_TRY(ov_target_scale(f->context, &f->target, 1.0));
 cleanup:
     return status;
@@ -223,7 +237,8 @@ ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size
     OV_TRY(ov_adaptive_aim(f, window));
     OV_TRY(start(f, kinds, count, best));
     OV_TRY(ov_adaptive_aim_at_volume(f, best));
-    OV_TRY(ov_adaptive_refine(f, best, "refine", 5, 1e-1, 1e-3));
+    OV_TRY(
+        ov_adaptive_refine(f, best, "refine", ov_tuned.refine_volume_steps, ov_tuned.refine_gain));
 cleanup:
     return status;
 }

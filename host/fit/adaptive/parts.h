@@ -33,7 +33,9 @@ struct ov_adaptive {
     ov_local local;
     ov_merger merger;
     ov_judge judge;
-    double spacing; /* of the points */
+    double spacing;   /* of the points */
+    double expected;  /* distance of a coarse model, in units of 1 / sqrt(2 d); 0: of none */
+    double width_max; /* angstrom: no axis, 1 / sqrt(decay rate), becomes longer */
     const char *stage;
     uint64_t steps;         /* refinement steps so far */
     uint64_t solver_before; /* iterations of conjugate gradients before this search */
@@ -72,10 +74,9 @@ void ov_trial_swap(ov_trial *a, ov_trial *b);
 /* Fills f->quadrics with the trial's ellipsoids. */
 void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t);
 
-/* At most `steps` of them, until one gains less than the share `decrease`; tolerance: of the
- * solver. */
+/* At most `steps` of them, until two gain less than the share `decrease`. */
 ovoid_status ov_adaptive_refine(ov_adaptive *f, ov_trial *t, const char *stage, uint32_t steps,
-                                double tolerance, double decrease);
+                                double decrease);
 ovoid_status ov_adaptive_refine_fully(ov_adaptive *f, ov_trial *t, const char *stage);
 ovoid_status ov_adaptive_refine_quickly(ov_adaptive *f, ov_trial *t, const char *stage);
 /* Refines the chosen ellipsoids alone, unless they are most of them; t->misfit stays as it is. */
@@ -96,7 +97,7 @@ ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t);
 /* The merged atoms of start `kind` at this count. */
 ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial *t);
 /* How atoms merge at the first start. */
-const ov_reduction_options *ov_adaptive_merging(void);
+ov_reduction_options ov_adaptive_merging(void);
 /* Goes back to the atoms of the chosen ellipsoids and merges these anew to `factor` times as many
  * ellipsoids, the atoms themselves at most, in place of the chosen; all stays as it is where the
  * chosen have no atoms. */

@@ -59,8 +59,8 @@ ovoid_status ov_adaptive_rebuild(ov_adaptive *f, ov_trial *t, double factor, con
     if (atoms == 0)
         goto cleanup;
     const size_t count = (size_t)fmin(fmax(ceil(factor * (double)old), 1.0), (double)atoms);
-    OV_TRY(
-        ov_reduction_create(f->context, quadrics, atoms, count, ov_adaptive_merging(), &reduction));
+    const ov_reduction_options merging = ov_adaptive_merging();
+    OV_TRY(ov_reduction_create(f->context, quadrics, atoms, count, &merging, &reduction));
     OV_TRY(ov_reduction_cut(f->context, reduction, count, quadrics, owner));
     take_places(t, chosen, quadrics, count, moved, slot);
     for (size_t i = 0; i < f->atoms; ++i)

@@ -1,25 +1,9 @@
 #include "fit/adaptive/refine.h"
 
+#include "fit/adaptive/constants.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* How far (angstrom) a cut-off ellipsoid may move before the lists are rebuilt: at first, and later
- * SKIN_GROWTH times what it moved before, within bounds. */
-#define SKIN 0.3
-#define SKIN_GROWTH 1.5
-#define SKIN_MIN 0.1
-#define SKIN_MAX 1.5
-/* Bounds of one step of one ellipsoid, beyond which its quadratic model means nothing: of the
- * centre (angstrom), of ln a, and of L relative to itself. */
-#define CENTRE_STEP 1.0
-#define AMPLITUDE_STEP 1.0
-#define FACTOR_STEP 0.5
-/* lambda: how it falls after two successes in a row and rises after a failure. */
-#define DAMPING_DOWN 0.5
-#define DAMPING_UP 4.0
-#define DAMPING_MIN 1e-7
-#define DAMPING_MAX 1e4
 
 static ovoid_status make_room(ov_refiner *r, size_t count) {
     if (count <= r->capacity)
@@ -36,7 +20,7 @@ static ovoid_status make_room(ov_refiner *r, size_t count) {
 
 static double motion(const ov_evaluation *e, const double *x, size_t i) {
     return ov_factor_motion(e->listed + i * OV_FACTOR_PARAMETERS, x + i * OV_FACTOR_PARAMETERS,
-                            OV_REFINE_CUTOFF);
+                            ov_tuned.refine_cutoff);
 }
 
 static bool lists_cover(const ov_evaluation *e, const ov_points *points, const double *x,
@@ -53,8 +37,10 @@ static bool lists_cover(const ov_evaluation *e, const ov_points *points, const d
 static void choose_skins(ov_evaluation *e, const double *x, size_t count) {
     for (size_t i = 0; i < count; ++i)
         e->skins[i] = e->listed_count == count
-                          ? (float)fmin(fmax(SKIN_GROWTH * motion(e, x, i), SKIN_MIN), SKIN_MAX)
-                          : (float)SKIN;
+                          ? (float)fmin(fmax(ov_tuned.refine_skin_growth * motion(e, x, i),
+                                             ov_tuned.refine_skin_min),
+                                        ov_tuned.refine_skin_max)
+                          : (float)ov_tuned.refine_skin;
 }
 
 static ovoid_status set_terms(ov_refiner *r, ov_evaluation *e, const ov_points *points,
@@ -62,7 +48,7 @@ static ovoid_status set_terms(ov_refiner *r, ov_evaluation *e, const ov_points *
     for (size_t i = 0; i < count; ++i)
         ov_factor_quadric(x + i * OV_FACTOR_PARAMETERS, &r->quadrics[i]);
     return ov_terms_set_skins(r->context, &e->terms, r->quadrics, e->skins, count, points->origin,
-                              OV_REFINE_CUTOFF);
+                              ov_tuned.refine_cutoff);
 }
 
 /* Sets the terms, and begins to build the lists again if they do not cover them any more: *begun.
@@ -188,8 +174,9 @@ static void take_step(const double *x, const double *step, size_t count, double 
             factor += by[k] * by[k];
             size += from[k] * from[k];
         }
-        const double share = fmax(fmax(sqrt(centre) / CENTRE_STEP, fabs(by[0]) / AMPLITUDE_STEP),
-                                  sqrt(factor / size) / FACTOR_STEP);
+        const double share = fmax(
+            fmax(sqrt(centre) / ov_tuned.refine_centre, fabs(by[0]) / ov_tuned.refine_amplitude),
+            sqrt(factor / size) / ov_tuned.refine_factor);
         const double scale = share > 1.0 ? 1.0 / share : 1.0;
         for (int k = 0; k < OV_FACTOR_PARAMETERS; ++k)
             to[k] = from[k] + scale * by[k];
@@ -229,7 +216,8 @@ ovoid_status ov_refine(ov_refiner *r, const ov_target *target, const ov_refine_o
     unsigned small = 0;
     bool fresh = true, failed = false; /* the last step */
     OV_TRY(ov_refine_evaluate(r, target, x, count, misfit));
-    for (uint32_t n = 1; n <= options->steps && small < 2 && damping < DAMPING_MAX; ++n) {
+    for (uint32_t n = 1; n <= options->steps && small < 2 && damping < ov_tuned.refine_damping_max;
+         ++n) {
         OV_TRY(find_step(r, target, options, x, damping, fresh));
         take_step(x, r->step, count, options->width_max, r->trial);
         status = evaluate(r, &r->tried, target, r->trial, count, &tried);
@@ -248,9 +236,9 @@ ovoid_status ov_refine(ov_refiner *r, const ov_target *target, const ov_refine_o
             memcpy(x, r->trial, bytes);
             *misfit = tried;
             if (!failed)
-                damping = fmax(DAMPING_DOWN * damping, DAMPING_MIN);
+                damping = fmax(ov_tuned.refine_damping_down * damping, ov_tuned.refine_damping_min);
         } else {
-            damping *= DAMPING_UP;
+            damping *= ov_tuned.refine_damping_up;
         }
         failed = !fresh;
         if (options->go_on && !options->go_on(n, *misfit, options->user)) {

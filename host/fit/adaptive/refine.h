@@ -8,9 +8,6 @@
 #include "fit/adaptive/solver.h"
 #include "fit/adaptive/target.h"
 
-/* A term counts where its value is at least this. */
-#define OV_REFINE_CUTOFF 1e-4
-
 typedef struct ov_refine_options {
     uint32_t steps;        /* at most, accepted or not */
     uint32_t solver_steps; /* of conjugate gradients, at most */

@@ -1,3 +1,4 @@
+#include "fit/adaptive/constants.h"
 #include "fit/adaptive/tolerance.h"
 #include "mixture/component.h"
 #include "neighbours/neighbours.h"
@@ -5,32 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Merged at once: this share of the ellipsoids at most, and so far apart (angstrom) that each
- * merge's neighbours can make up for it. */
-#define SHARE 0.12
-#define SHARE_MIN 0.015
-#define TRIES_MIN 2
-#define APART 7.0
-#define ADAPT_REACH 10.0
-/* Of all pairs of neighbours, the cheapest: few of the others can merge. */
-#define PAIRS_PER_EFFORT 0.5
-/* A merge that was too much is not tried again: none within this (angstrom) of where it lay, */
-#define SAME_MERGE 1.0
-/* and a place is left alone where so many were too much: at first few, so that all places have
- * their turn, in the end so many per effort. */
-#define DONE_REACH 5.0
-#define DONE_FIRST 2
-#define DONE_PER_EFFORT 8
-/* Where the model is off after a round of merges, the nearest are taken back, in so many rounds,
- * and what is this near to a spot adapts to it; what is still off then grows. */
-#define BACK_ROUNDS 2
-#define BACK_REACH 8.0
-#define REGROW_ROUNDS 6
-/* Shrinking ends when so many rounds and tries per effort gained less than this share together. */
-#define GAIN 0.006
-#define IDLE_ROUNDS 5
-#define IDLE_TRIES 30
 
 /* A model that shrinks. */
 typedef struct shrinking {
@@ -49,9 +24,9 @@ typedef struct shrinking {
 
 static ovoid_status shrinking_create(ov_adaptive *f, shrinking *s) {
     ovoid_status status = OVOID_OK;
-    *s = (shrinking){.share = SHARE,
-                     .limit = DONE_FIRST,
-                     .most = DONE_PER_EFFORT * (size_t)f->options->adaptive.effort};
+    *s = (shrinking){.share = ov_tuned.shrink_share,
+                     .limit = ov_tuned.shrink_done_first,
+                     .most = ov_tuned.shrink_done * (size_t)f->options->adaptive.effort};
     OV_TRY(ov_trial_create(f, &s->next));
     s->parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
     s->more_parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
@@ -95,9 +70,9 @@ static ovoid_status index_failures(ov_adaptive *f, shrinking *s) {
     if (failed->count == 0)
         return OVOID_OK;
     OV_TRY(ov_grid_of(f->context, failed->place->at, sizeof *failed->place, failed->count,
-                      SAME_MERGE, &s->same));
+                      ov_tuned.shrink_same, &s->same));
     OV_TRY(ov_grid_of(f->context, failed->place->at, sizeof *failed->place, failed->count,
-                      DONE_REACH, &s->done));
+                      ov_tuned.shrink_done_reach, &s->done));
 cleanup:
     return status;
 }
@@ -105,11 +80,11 @@ cleanup:
 /* Merges what costs least of the best model, in many places at once. */
 static ovoid_status merge(ov_adaptive *f, const ov_trial *best, shrinking *s) {
     ovoid_status status = OVOID_OK;
-    const size_t fewer = (size_t)fmax(s->share * (double)best->count, TRIES_MIN);
-    const ov_merging merging = {.share = PAIRS_PER_EFFORT * f->options->adaptive.effort,
+    const size_t fewer = (size_t)fmax(s->share * (double)best->count, ov_tuned.shrink_tries_min);
+    const ov_merging merging = {.share = ov_tuned.shrink_pairs * f->options->adaptive.effort,
                                 .allowed = allowed,
                                 .user = s,
-                                .apart = APART,
+                                .apart = ov_tuned.shrink_apart,
                                 .parents = s->parents};
     double misfit;
     OV_TRY(index_failures(f, s));
@@ -143,8 +118,8 @@ static ovoid_status adapt(ov_adaptive *f, shrinking *s) {
     for (size_t i = 0; i < s->next.count; ++i)
         if (is_merged(s, i))
             memcpy(merged.spot[merged.count++].at, centre_of(s->next.x, i), sizeof merged.spot->at);
-    OV_TRY(choose_near(f, &merged, ADAPT_REACH, s));
-    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", OV_LOCAL_STEPS, s->chosen));
+    OV_TRY(choose_near(f, &merged, ov_tuned.shrink_adapt, s));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", ov_tuned.refine_local_steps, s->chosen));
 cleanup:
     ov_spots_destroy(&merged);
     return status;
@@ -227,8 +202,8 @@ static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spot
     choose_nearest(s, spots);
     OV_TRY(remember(f, best, s));
     take_back(best, s);
-    OV_TRY(choose_near(f, spots, BACK_REACH, s));
-    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", OV_LOCAL_STEPS, s->chosen));
+    OV_TRY(choose_near(f, spots, ov_tuned.shrink_back, s));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", ov_tuned.refine_local_steps, s->chosen));
 cleanup:
     return status;
 }
@@ -237,9 +212,11 @@ cleanup:
 static ovoid_status settle(ov_adaptive *f, double tolerance, const ov_trial *best, shrinking *s) {
     ovoid_status status = OVOID_OK;
     ov_spots spots = {0};
-    const ov_growing how = {.stage = "shrink", .most = best->count - 1, .rounds = REGROW_ROUNDS};
+    const ov_growing how = {
+        .stage = "shrink", .most = best->count - 1, .rounds = ov_tuned.shrink_grow_rounds};
     OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
-    for (int n = 0; n < BACK_ROUNDS && spots.count > 0 && s->next.count < best->count; ++n) {
+    for (uint32_t n = 0;
+         n < ov_tuned.shrink_back_rounds && spots.count > 0 && s->next.count < best->count; ++n) {
         OV_TRY(back_off(f, best, &spots, s));
         OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
     }
@@ -254,9 +231,9 @@ cleanup:
 /* Fewer at once where most were too much: each then has its neighbours to itself. */
 static void choose_share(shrinking *s, size_t tries, size_t held) {
     if (4 * held < tries)
-        s->share = fmax(0.5 * s->share, SHARE_MIN);
+        s->share = fmax(0.5 * s->share, ov_tuned.shrink_share_min);
     else if (2 * held > tries)
-        s->share = fmin(2.0 * s->share, SHARE);
+        s->share = fmin(2.0 * s->share, ov_tuned.shrink_share);
 }
 
 /* Whether the last rounds were worth their while: too little was gained in a few of them and in
@@ -264,12 +241,13 @@ static void choose_share(shrinking *s, size_t tries, size_t held) {
 static bool is_idle(shrinking *s, size_t tries, size_t count, uint32_t effort) {
     ++s->idle_rounds;
     s->idle_tries += tries;
-    if ((double)count <= (1.0 - GAIN) * (double)s->milestone) {
+    if ((double)count <= (1.0 - ov_tuned.shrink_gain) * (double)s->milestone) {
         s->milestone = count;
         s->idle_rounds = 0;
         s->idle_tries = 0;
     }
-    return s->idle_rounds >= IDLE_ROUNDS * effort && s->idle_tries >= IDLE_TRIES * effort;
+    return s->idle_rounds >= ov_tuned.shrink_idle_rounds * effort &&
+           s->idle_tries >= ov_tuned.shrink_idle_tries * effort;
 }
 
 ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best) {

@@ -1,5 +1,6 @@
 #include "fit/adaptive/target.h"
 
+#include "fit/adaptive/constants.h"
 #include "neighbours/neighbours.h"
 
 #include <float.h>
@@ -9,16 +10,16 @@
 
 void ov_target_options_init(ov_target_options *options) {
     *options = (ov_target_options){
-        .low = 0.02,
-        .high = 2.0,
-        .slope_min = 0.7,
-        .window = 0.5,
-        .floor = 0.05,
-        .inside_every = 2,
-        .inside_weight = 2.0,
-        .outside_every = 3,
-        .outside_low = 1e-4,
-        .outside_weight = 0.5,
+        .low = ov_tuned.target_low,
+        .high = ov_tuned.target_high,
+        .slope_min = ov_tuned.target_slope,
+        .window = ov_tuned.target_window,
+        .floor = ov_tuned.target_floor,
+        .inside_every = ov_tuned.target_inside_every,
+        .inside_weight = ov_tuned.target_inside_weight,
+        .outside_every = ov_tuned.target_outside_every,
+        .outside_low = ov_tuned.target_outside_low,
+        .outside_weight = ov_tuned.target_outside_weight,
     };
 }
 
@@ -143,7 +144,7 @@ cleanup:
  * neck of a tunnel opens or closes with a percent of the field, and at a thousandth of the surface
  * the volume can do without it. */
 static void emphasise_point(ov_target *target, size_t k, float factor) {
-    target->emphasis[k] = fminf(target->emphasis[k] * factor, OV_EMPHASIS_MAX);
+    target->emphasis[k] = fminf(target->emphasis[k] * factor, (float)ov_tuned.spots_emphasis_max);
     if (target->host_low[k] == target->host_high[k])
         target->host_low[k] = target->host_high[k] = target->phi[k];
 }

@@ -51,9 +51,8 @@ ovoid_status ov_target_window(ovoid_context *context, ov_target *target, double 
 ovoid_status ov_target_scale(ovoid_context *context, ov_target *target, double factor);
 
 /* Multiplies the weights of the points within `reach` (angstrom) of any of the places (x, y, z
- * each, `stride` bytes apart) by `factor`, all such factors together up to OV_EMPHASIS_MAX. There
+ * each, `stride` bytes apart) by `factor`, all such factors together up to a bound. There
  * phi itself is asked for again, whatever ov_target_scale() said. */
-#define OV_EMPHASIS_MAX 64.0f
 ovoid_status ov_target_emphasise(ovoid_context *context, ov_target *target, const double *places,
                                  size_t stride, size_t count, double reach, double factor);
 

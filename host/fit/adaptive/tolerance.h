@@ -8,15 +8,11 @@
 #include "fit/adaptive/parts.h"
 #include "fit/adaptive/places.h"
 
-/* Steps after a change here and there: counted, since the misfit of the whole says little of them.
- */
-#define OV_LOCAL_STEPS 12
-
 /* How long growing may go on. */
 typedef struct ov_growing {
     const char *stage;
     size_t most; /* ellipsoids */
-    int rounds;
+    uint32_t rounds;
 } ov_growing;
 
 /* Whether the tolerance was seen to hold when the trial was judged last. */

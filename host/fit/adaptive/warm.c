@@ -1,14 +1,9 @@
 #include "fit/adaptive/tolerance.h"
 
+#include "fit/adaptive/constants.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* From another count: merged or split at once is this share of the ellipsoids, and merges lie so
- * far apart (angstrom) that each one's neighbours can make up for it. */
-#define MERGED_AT_ONCE 0.12
-#define SPLIT_AT_ONCE 0.3
-#define APART 4.0
 
 ovoid_status ov_adaptive_take_start(ov_adaptive *f, ov_trial *t) {
     const ov_found *const start = f->start;
@@ -29,9 +24,9 @@ cleanup:
 static ovoid_status merge_some(ov_adaptive *f, size_t count, ov_trial *t) {
     ovoid_status status = OVOID_OK;
     const size_t before = t->count;
-    const size_t share = (size_t)fmax(MERGED_AT_ONCE * (double)before, 1.0);
+    const size_t share = (size_t)fmax(ov_tuned.warm_merge_share * (double)before, 1.0);
     const size_t fewer = before - count < share ? before - count : share;
-    ov_merging merging = {.apart = APART, .parents = f->parents};
+    ov_merging merging = {.apart = ov_tuned.warm_merge_apart, .parents = f->parents};
     double misfit;
     OV_TRY(ov_refine_evaluate(&f->refiner, &f->target, t->x, t->count, &misfit));
     OV_TRY(
@@ -45,7 +40,7 @@ cleanup:
 /* Splits where the misfit is largest, a share of it at once. */
 static ovoid_status split_some(ov_adaptive *f, size_t count, ov_trial *t) {
     ovoid_status status = OVOID_OK;
-    const size_t share = (size_t)fmax(SPLIT_AT_ONCE * (double)t->count, 1.0);
+    const size_t share = (size_t)fmax(ov_tuned.warm_split_share * (double)t->count, 1.0);
     const size_t more = count - t->count < share ? count - t->count : share;
     double misfit;
     OV_TRY(ov_refine_evaluate(&f->refiner, &f->target, t->x, t->count, &misfit));

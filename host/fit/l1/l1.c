@@ -2,17 +2,13 @@
 
 #include "base/progress.h"
 
+#include "fit/l1/constants.h"
 #include "fit/l1/objective.h"
 #include "model/owner.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* The largest change of a parameter (angstrom, radian, ...) that a line search tries first, and the
- * one it starts from when it has no accepted step to go by. */
-#define FIRST_CHANGE_MAX 0.2
-#define FIRST_CHANGE 0.01
 
 typedef struct fit {
     const ovoid_fit_options *options;
@@ -87,8 +83,8 @@ static double first_step(const fit *f, size_t size, double largest) {
     if (f->comparable && f->options->l1.first_step == OVOID_FIRST_STEP_SECANT)
         step = secant_step(f, size);
     if (!(step > 0.0))
-        step = f->step > 0.0 ? f->options->l1.grow * f->step : FIRST_CHANGE / largest;
-    return fmin(step, FIRST_CHANGE_MAX / largest);
+        step = f->step > 0.0 ? f->options->l1.grow * f->step : ov_l1_tuned.change_first / largest;
+    return fmin(step, ov_l1_tuned.change_max / largest);
 }
 
 /* A trial too far out to be a model, or to have a finite field, is as good as rejected. */

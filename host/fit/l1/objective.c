@@ -1,23 +1,13 @@
 #include "fit/l1/objective.h"
 
+#include "fit/l1/constants.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* A term counts where its value is at least this; the sum of what is left out stays near 1e-4. */
-#define CUTOFF 1e-5
-/* How far (angstrom) a cut-off ellipsoid may move before the lists are rebuilt: widened when
- * rebuilds come more often than every SKIN_FEW evaluations, narrowed when more rarely than every
- * SKIN_MANY. */
-#define SKIN_FIRST 0.25
-#define SKIN_MIN 0.1
-#define SKIN_MAX 1.5
-#define SKIN_FEW 25
-#define SKIN_MANY 150
-
 /* Half-lengths of the cut-off ellipsoid along its axes, zero where it reaches nothing. */
 static void half_lengths(const double *p, double half[3]) {
-    const double q = 2.0 * log(fmax(fabs(p[OV_L1_C]), 1e-15)) - log(CUTOFF);
+    const double q = 2.0 * log(fmax(fabs(p[OV_L1_C]), 1e-15)) - log(ov_l1_tuned.cutoff);
     for (int k = 0; k < 3; ++k)
         half[k] = q > 0.0 ? sqrt(q / fmax(p[OV_L1_D + k] * p[OV_L1_D + k], OV_L1_DECAY_MIN)) : 0.0;
 }
@@ -54,10 +44,10 @@ static bool lists_cover(const ov_l1_objective *objective, const double *x, size_
 /* By counts alone, not by the clock, so that two runs do the same. A pruned model does not tell. */
 static void adapt_skin(ov_l1_objective *objective, size_t count) {
     const uint64_t passes = objective->profile.field_passes - objective->listed_at;
-    if (objective->listed_count == count && passes < SKIN_FEW)
-        objective->skin = fmin(1.5 * objective->skin, SKIN_MAX);
-    else if (objective->listed_count == count && passes > SKIN_MANY)
-        objective->skin = fmax(objective->skin / 1.5, SKIN_MIN);
+    if (objective->listed_count == count && passes < ov_l1_tuned.skin_few)
+        objective->skin = fmin(ov_l1_tuned.skin_factor * objective->skin, ov_l1_tuned.skin_max);
+    else if (objective->listed_count == count && passes > ov_l1_tuned.skin_many)
+        objective->skin = fmax(objective->skin / ov_l1_tuned.skin_factor, ov_l1_tuned.skin_min);
     objective->listed_at = objective->profile.field_passes;
 }
 
@@ -87,7 +77,7 @@ ovoid_status ov_l1_evaluate(ov_l1_objective *objective, const double *x, size_t 
     for (size_t i = 0; i < count; ++i)
         ov_l1_quadric(x + i * OV_L1_PARAMETERS, &objective->quadrics[i]);
     OV_TRY(ov_terms_set(objective->context, &objective->terms, objective->quadrics, count,
-                        points->origin, CUTOFF));
+                        points->origin, ov_l1_tuned.cutoff));
     objective->profile.host_seconds += ov_seconds() - start;
     OV_TRY(refresh_lists(objective, x, count));
 
@@ -166,7 +156,7 @@ ovoid_status ov_l1_objective_create(ovoid_context *context, const ov_samples *sa
                             .samples = samples,
                             .limit = limit,
                             .kernel = kernel,
-                            .skin = SKIN_FIRST};
+                            .skin = ov_l1_tuned.skin_first};
     made.listed =
         ov_alloc(context, ellipsoids * OV_L1_PARAMETERS, sizeof *made.listed, "parameters");
     made.quadrics = ov_alloc(context, ellipsoids, sizeof *made.quadrics, "ellipsoids");

@@ -1,0 +1,45 @@
+#!/bin/sh
+# wheel.sh PYTHON REPOSITORY BUILD
+# What pip makes of the sources, in an environment of its own: builds the wheel in BUILD, which is kept, so
+# that only what changed is compiled again, and does what the issue of every newcomer is: read, fit, measure.
+# Skipped (77) where there is no venv, or pip cannot reach a registry.
+set -eu
+python=$1
+repository=$2
+build=$3
+entry=/usr/share/pymol/data/demo/pept.pdb
+[ -r "$entry" ] || { echo "skipped: no $entry (Debian: pymol-data)"; exit 77; }
+mkdir -p "$build"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+"$python" -m venv "$work/env" 2>"$work/error" || {
+    echo "skipped: no virtual environment (Debian: python3-venv)"
+    exit 77
+}
+pip="$work/env/bin/pip --disable-pip-version-check -q"
+$pip install scikit-build-core numpy 2>"$work/error" || {
+    tail -1 "$work/error"
+    echo "skipped: pip cannot install scikit-build-core and numpy"
+    exit 77
+}
+$pip wheel --no-deps --no-build-isolation -w "$work" --config-settings=build-dir="$build" "$repository/python"
+wheel=$(echo "$work"/ovoid-*-py3-none-*.whl)
+[ -e "$wheel" ] || { echo "there is no wheel for all versions of Python: $(ls "$work")"; exit 1; }
+$pip install "$wheel"
+rm -rf "$work/bin"
+unset PYTHONPATH OVOID_LIBRARY LD_LIBRARY_PATH
+cd "$work"
+"$work/env/bin/ovoid" --version
+"$work/env/bin/python" -W error - "$entry" <<'PYTHON'
+import sys
+import ovoid
+assert "site-packages" in ovoid._abi.lib.cdll._name, ovoid._abi.lib.cdll._name
+molecule = ovoid.read(sys.argv[1])
+model = molecule.fit(tolerance=0.5)
+print(model, model.measure(molecule).hausdorff, model.mesh().vertices.shape)
+assert model.report.reached and model.measure(molecule).deviation <= 0.5
+PYTHON
+# A system without an OpenCL loader: the package's own serves the library and the tool.
+loader=$(echo "$work"/env/lib/python3*/site-packages/ovoid/loader/libOpenCL.so.1)
+[ -e "$loader" ] || { echo "the wheel holds no OpenCL loader (built from another one than ocl-icd)"; exit 0; }
+[ -e "$(dirname "$loader")/LICENSE" ] || { echo "the loader has no licence"; exit 1; }

@@ -248,7 +248,7 @@ static void pymol_script_draws_the_ellipsoids(void **state) {
 static void point_on(const ovoid_ellipsoid *e, double c, const double direction[3], double z[3]) {
     const double x[3] = {e->centre[0] + direction[0], e->centre[1] + direction[1],
                          e->centre[2] + direction[2]};
-    const double q = log(e->amplitude / reference_ellipsoid(e, x));
+    const double q = log(e->amplitude / ov_twin_ellipsoid(e, x));
     const double level = e->amplitude > c ? log(e->amplitude / c) : log(2.0);
     for (int k = 0; k < 3; k++)
         z[k] = direction[k] * sqrt(level / q);
@@ -625,7 +625,7 @@ static void splats_are_the_gaussians(void **state) {
         for (int p = 0; p < 3; p++) {
             for (int k = 0; k < 3; k++)
                 x[k] = e->centre[k] + v[p][k];
-            expect_near(reference_ellipsoid(e, x) / e->amplitude, exp(-0.5), 1e-3, "splat");
+            expect_near(ov_twin_ellipsoid(e, x) / e->amplitude, exp(-0.5), 1e-3, "splat");
         }
         expect_near((double)at[0], e->centre[0], 1e-5 * (1 + fabs(e->centre[0])), "position");
         expect_near((double)f[10 * count + i], 1 - exp(-e->amplitude), 1e-6, "opacity");
@@ -682,7 +682,7 @@ static void ihm_says_what_is_where(void **state) {
                                 c + 4, c + 5, c + 6, c + 7, c + 8),
                          13);
         const double x[3] = {g.mean[0] + 0.7, g.mean[1] - 0.4, g.mean[2] + 1.1};
-        expect_near(density(&g, x) / reference_ellipsoid(&e[i], x), 1.0, 1e-6, "Gaussian");
+        expect_near(density(&g, x) / ov_twin_ellipsoid(&e[i], x), 1.0, 1e-6, "Gaussian");
     }
     assert_string_equal(next_line(at), "#\n");
     free(text);

@@ -270,7 +270,7 @@ static void expect_step(ov_checking *c, const problem *p, const double *wanted, 
 static ovoid_status solve(ov_checking *c, problem *p, bool apart, const double *wanted,
                           double *got) {
     ov_setting *const s = &p->s;
-    ov_solver solver = {.apart = apart, .looks = OV_LOOKS_WAIT};
+    ov_solver solver = {.apart = apart};
     const ov_system system = {.points = &s->points,
                               .terms = &s->terms,
                               .lists = &s->lists,

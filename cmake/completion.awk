@@ -6,7 +6,7 @@
 
 # The endings in a text: 'ply obj' in 'a name ends in .ply or .obj'.
 function endings(text,   found, ending) {
-    while (match(text, /\.[a-z][a-z0-9]*/)) {
+    while (match(text, /\.([a-z]|3m)[a-z0-9]*/)) {
         ending = substr(text, RSTART + 1, RLENGTH - 1)
         if (index(found " ", " " ending " ") == 0)
             found = found " " ending
@@ -32,7 +32,7 @@ function end_option(   count, parts, i, words, files, folders) {
         value = "cpu|gpu|accelerator"
     count = split(value, parts, "|")
     for (i = 1; i <= count; i++)
-        if (parts[i] ~ /^[a-z]/)
+        if (parts[i] ~ /^[a-z0-9]/)
             words = words " " parts[i]
         else if (parts[i] == "FILE")
             files = files_of()

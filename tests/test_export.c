@@ -770,11 +770,11 @@ static void formats_have_names(void **state) {
                  {NULL, OVOID_EXPORT_AUTO},       {"a very long name", OVOID_EXPORT_AUTO}};
     for (size_t i = 0; i < sizeof known / sizeof *known; i++)
         assert_int_equal(ovoid_export_format_find(known[i].name), known[i].format);
-    for (int i = 1; i <= OVOID_EXPORT_SPLAT; i++)
+    for (int i = 1; i <= OVOID_EXPORT_MSMS; i++)
         assert_int_equal(ovoid_export_format_find(ovoid_export_format_name((ovoid_export_format)i)),
                          i);
     assert_null(ovoid_export_format_name(OVOID_EXPORT_AUTO));
-    assert_null(ovoid_export_format_name((ovoid_export_format)(OVOID_EXPORT_SPLAT + 1)));
+    assert_null(ovoid_export_format_name((ovoid_export_format)(OVOID_EXPORT_MSMS + 1)));
 }
 
 static void refuse_scene(const ovoid_scene *scene, const char *path, const char *text) {
@@ -812,7 +812,7 @@ static void what_makes_no_sense_is_refused(void **state) {
         test_refused(context, once_model_export(context, model, scratch_path(*state, bad[i]), NULL),
                      OVOID_ERROR_ARGUMENT,
                      "one of .bild, .cxc, .py, .gmm, .json, .xyz, .lmp, .pdb, .gltf, .cif, .mrc, "
-                     ".map, .ccp4, .dx, .html");
+                     ".map, .ccp4, .dx, .ply, .glb, .3mf, .vert, .html");
     test_refused(context, once_model_export(context, model, "-", NULL), OVOID_ERROR_ARGUMENT,
                  "name a format");
     const char *path = scratch_path(*state, "m.xtc");

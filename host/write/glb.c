@@ -6,8 +6,10 @@
  * angstrom, as other programs for molecules have it, and asset.extras says so.
  *
  * Positions are floats. Far from the origin, where these are coarse, they are relative to the
- * middle of the mesh, and the node moves them there. */
+ * middle of the mesh, and the node moves them there. Colours of vertices, where there are any, are
+ * linear light in 16 bits, between normals and indices. */
 #include "base/progress.h"
+#include "picture/palette.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -15,19 +17,21 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { HEADER = 12, CHUNK_HEADER = 8, VECTOR = 12, TEXT = 2048 };
+enum { HEADER = 12, CHUNK_HEADER = 8, VECTOR = 12, COLOUR = 8, TEXT = 3072 };
 
 typedef struct layout {
     size_t vertices, triangles;
     uint64_t vectors; /* bytes of the positions, and of the normals */
+    uint64_t colours; /* bytes; 0: none */
     uint64_t indices; /* bytes */
     float low[3], high[3];
     double origin[3]; /* of the positions, angstrom */
 } layout;
 
-static void find_layout(const ovoid_mesh *mesh, layout *l) {
+static void find_layout(const ovoid_mesh *mesh, const ov_colours *colours, layout *l) {
     *l = (layout){.vertices = ovoid_mesh_vertices(mesh), .triangles = ovoid_mesh_triangles(mesh)};
     l->vectors = (uint64_t)l->vertices * VECTOR;
+    l->colours = colours ? (uint64_t)l->vertices * COLOUR : 0;
     l->indices = (uint64_t)l->triangles * VECTOR;
     if (!ov_mesh_floats_are_fine(mesh, l->origin))
         ov_mesh_middle(mesh, l->origin);
@@ -43,7 +47,19 @@ static void find_layout(const ovoid_mesh *mesh, layout *l) {
 
 /* The JSON chunk, filled up with blanks to a multiple of four. Nine digits keep a float. */
 static uint32_t print_json(const layout *l, char *text) {
-    char moved[128] = "";
+    char moved[128] = "", view[128] = "", accessor[128] = "";
+    const uint64_t colours = 2 * l->vectors, indices = colours + l->colours;
+    const char *const grey = l->colours ? "1,1,1,1" : "0.8,0.8,0.8,1";
+    if (l->colours) {
+        snprintf(view, sizeof view,
+                 ",{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64
+                 ",\"target\":34962}",
+                 colours, l->colours);
+        snprintf(accessor, sizeof accessor,
+                 ",{\"bufferView\":3,\"componentType\":5123,\"normalized\":true,\"count\":%zu,"
+                 "\"type\":\"VEC4\"}",
+                 l->vertices);
+    }
     if (l->origin[0] != 0.0 || l->origin[1] != 0.0 || l->origin[2] != 0.0)
         snprintf(moved, sizeof moved, ",\"translation\":[%.9g,%.9g,%.9g]", l->origin[0],
                  l->origin[1], l->origin[2]);
@@ -54,22 +70,22 @@ static uint32_t print_json(const layout *l, char *text) {
         "\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
         "\"nodes\":[{\"mesh\":0,\"name\":\"surface\"%s}],"
         "\"meshes\":[{\"name\":\"surface\",\"primitives\":[{\"attributes\":{\"POSITION\":0,"
-        "\"NORMAL\":1},\"indices\":2,\"material\":0,\"mode\":4}]}],"
+        "\"NORMAL\":1%s},\"indices\":2,\"material\":0,\"mode\":4}]}],"
         "\"materials\":[{\"name\":\"surface\",\"pbrMetallicRoughness\":{\"baseColorFactor\":"
-        "[0.8,0.8,0.8,1],\"metallicFactor\":0,\"roughnessFactor\":0.6}}],"
+        "[%s],\"metallicFactor\":0,\"roughnessFactor\":0.6}}],"
         "\"buffers\":[{\"byteLength\":%" PRIu64 "}],"
         "\"bufferViews\":[{\"buffer\":0,\"byteOffset\":0,\"byteLength\":%" PRIu64
         ",\"target\":34962},"
         "{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 ",\"target\":34962},"
-        "{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 ",\"target\":34963}],"
+        "{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 ",\"target\":34963}%s],"
         "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":%zu,\"type\":\"VEC3\","
         "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]},"
         "{\"bufferView\":1,\"componentType\":5126,\"count\":%zu,\"type\":\"VEC3\"},"
-        "{\"bufferView\":2,\"componentType\":5125,\"count\":%zu,\"type\":\"SCALAR\"}]}",
-        ovoid_version(), moved, 2 * l->vectors + l->indices, l->vectors, l->vectors, l->vectors,
-        2 * l->vectors, l->indices, l->vertices, (double)l->low[0], (double)l->low[1],
-        (double)l->low[2], (double)l->high[0], (double)l->high[1], (double)l->high[2], l->vertices,
-        3 * l->triangles);
+        "{\"bufferView\":2,\"componentType\":5125,\"count\":%zu,\"type\":\"SCALAR\"}%s]}",
+        ovoid_version(), moved, l->colours ? ",\"COLOR_0\":3" : "", grey, indices + l->indices,
+        l->vectors, l->vectors, l->vectors, indices, l->indices, view, l->vertices,
+        (double)l->low[0], (double)l->low[1], (double)l->low[2], (double)l->high[0],
+        (double)l->high[1], (double)l->high[2], l->vertices, 3 * l->triangles, accessor);
     while (length % 4)
         text[length++] = ' ';
     return (uint32_t)length;
@@ -84,8 +100,14 @@ static void put_normal(ov_bytes *bytes, const float *normal) {
         ov_put_f32(bytes, usable ? (float)(n[axis] / length) : axis == 2 ? 1.0f : 0.0f);
 }
 
+static void put_colour(ov_bytes *bytes, const uint8_t *rgb) {
+    for (int k = 0; k < 3; k++)
+        ov_put_u16(bytes, (unsigned)lround(UINT16_MAX * ov_srgb_decode(rgb[k])));
+    ov_put_u16(bytes, UINT16_MAX);
+}
+
 static ovoid_status put_buffer(ovoid_context *context, ov_bytes *bytes, const ovoid_mesh *mesh,
-                               const layout *l) {
+                               const ov_colours *colours, const layout *l) {
     ovoid_status status = OVOID_OK;
     const float *normals = ovoid_mesh_normals(mesh);
     const uint32_t *corners = ovoid_mesh_corners(mesh);
@@ -100,6 +122,10 @@ static ovoid_status put_buffer(ovoid_context *context, ov_bytes *bytes, const ov
         OV_TRY(ov_progress_turn(context, i, l->vertices));
         put_normal(bytes, normals + 3 * i);
     }
+    for (size_t i = 0; colours && i < l->vertices; i++) {
+        OV_TRY(ov_progress_turn(context, i, l->vertices));
+        put_colour(bytes, colours->rgb + 3 * i);
+    }
     for (size_t i = 0; i < 3 * l->triangles; i++) {
         OV_TRY(ov_progress_turn(context, i, 3 * l->triangles));
         ov_put_u32(bytes, corners[i]);
@@ -109,17 +135,22 @@ cleanup:
 }
 
 ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream) {
+    return ov_write_glb_with(context, mesh, NULL, stream);
+}
+
+ovoid_status ov_write_glb_with(ovoid_context *context, const ovoid_mesh *mesh,
+                               const ov_colours *colours, FILE *stream) {
     layout l;
     char json[TEXT];
     ov_bytes bytes = {.stream = stream};
-    find_layout(mesh, &l);
+    find_layout(mesh, colours, &l);
     if (!ov_mesh_floats_suffice(mesh, l.origin))
         return ov_fail(
             context, OVOID_ERROR_LIMIT,
             "glTF has single precision alone, which is too coarse for a mesh that is so large "
             "and so fine: write .ply");
     const uint32_t json_length = print_json(&l, json);
-    const uint64_t buffer = 2 * l.vectors + l.indices;
+    const uint64_t buffer = 2 * l.vectors + l.colours + l.indices;
     const uint64_t total = HEADER + 2 * CHUNK_HEADER + json_length + buffer;
     if (total > UINT32_MAX)
         return ov_fail(context, OVOID_ERROR_LIMIT,
@@ -133,7 +164,7 @@ ovoid_status ov_write_glb(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     ov_put_text(&bytes, json, json_length);
     ov_put_u32(&bytes, (uint32_t)buffer);
     ov_put_text(&bytes, "BIN\0", 4);
-    const ovoid_status status = put_buffer(context, &bytes, mesh, &l);
+    const ovoid_status status = put_buffer(context, &bytes, mesh, colours, &l);
     ov_bytes_flush(&bytes);
     return status;
 }

@@ -36,6 +36,19 @@ int ov_mesh_digits(const ovoid_mesh *mesh);
 
 /* ---- formats ------------------------------------------------------------------------------ */
 
+/* Colours of the vertices: red, green, blue of each (sRGB), and a number that they stand for, which
+ * PLY keeps as `quality`; difference may be NULL. */
+typedef struct ov_colours {
+    const uint8_t *rgb;
+    const float *difference;
+} ov_colours;
+
+/* colours may be NULL. */
+ovoid_status ov_write_ply_with(ovoid_context *context, const ovoid_mesh *mesh,
+                               const ov_colours *colours, FILE *stream);
+ovoid_status ov_write_glb_with(ovoid_context *context, const ovoid_mesh *mesh,
+                               const ov_colours *colours, FILE *stream);
+
 ovoid_status ov_write_ply(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream);
 ovoid_status ov_write_obj(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream);
 ovoid_status ov_write_stl(ovoid_context *context, const ovoid_mesh *mesh, FILE *stream);

@@ -7,6 +7,7 @@
 #include "write/export.h"
 #include "write/page_blocks.h"
 #include "write/page_names.h"
+#include "write/paint.h"
 #include "write/text.h"
 
 #include <math.h>
@@ -31,39 +32,6 @@ typedef struct page {
 } page;
 
 /* ---- what is measured ------------------------------------------------------------------------ */
-
-static int by_value(const void *a, const void *b) {
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
-double ov_page_round_range(double value) {
-    static const double steps[] = {1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0};
-    if (!(value > 1e-3))
-        return 1e-3;
-    const double power = pow(10.0, floor(log10(value) + 1e-9));
-    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
-        if (value <= steps[i] * power * (1.0 + 1e-6))
-            return steps[i] * power;
-    return 10.0 * power;
-}
-
-/* What 99 % of the distances stay within. */
-static ovoid_status find_range(ovoid_context *context, page *p, const float *values, size_t count) {
-    if (p->options->range > 0.0 || p->range > 0.0 || !count) {
-        p->range = p->range > 0.0 ? p->range : p->options->range;
-        return OVOID_OK;
-    }
-    float *sizes = ov_alloc(context, count, sizeof *sizes, "distances of vertices");
-    if (!sizes)
-        return OVOID_ERROR_MEMORY;
-    for (size_t i = 0; i < count; i++)
-        sizes[i] = fabsf(values[i]);
-    qsort(sizes, count, sizeof *sizes, by_value);
-    p->range = ov_page_round_range((double)sizes[(size_t)(0.99 * (double)(count - 1))]);
-    free(sizes);
-    return OVOID_OK;
-}
 
 /* The spacing asked for, or a larger one with which no surface has too many triangles: their number
  * goes with the square of the spacing. */
@@ -130,7 +98,8 @@ static ovoid_status put_difference(ovoid_context *context, page *p, const ovoid_
         if (of_model) /* where its vertex is within the molecule, the model is inside it */
             distance[i] = -distance[i];
     }
-    OV_TRY(find_range(context, p, distance, vertices));
+    if (p->range == 0.0)
+        OV_TRY(ov_paint_range(context, p->options->range, distance, vertices, &p->range));
     fprintf(p->differences,
             "%s{\"id\":\"%s\",\"detail\":%d,\"level\":%d,\"of\":\"%s\",\"largest\":%.4g}",
             ftell(p->differences) > 0 ? "," : "", id, detail, level,

@@ -17,7 +17,4 @@ extern const ov_page_source ov_page_sources[];
 ovoid_status ov_write_page(ovoid_context *context, const ov_scene *scene,
                            const ovoid_export_options *options, const char *title, FILE *stream);
 
-/* The next number not below `value`, at least 0.001, that reads well at the end of a scale. */
-double ov_page_round_range(double value);
-
 #endif

@@ -28,8 +28,23 @@ typedef enum ovoid_export_format {
     OVOID_EXPORT_XYZ,    /* .xyz, .extxyz: extended XYZ with semi-axes and orientations, OVITO's */
     OVOID_EXPORT_LAMMPS, /* .lmp, .data: LAMMPS data of atom style ellipsoid */
     OVOID_EXPORT_ANISOU, /* .pdb, .ent: pseudo-atoms with ANISOU */
-    OVOID_EXPORT_SPLAT   /* .gltf: glTF with KHR_gaussian_splatting */
+    OVOID_EXPORT_SPLAT,  /* .gltf: glTF with KHR_gaussian_splatting */
+    /* and surfaces of scenes, the molecule's or without one the first model's: */
+    OVOID_EXPORT_PLY, /* .ply: binary, with colours */
+    OVOID_EXPORT_GLB, /* .glb: binary glTF, with colours */
+    OVOID_EXPORT_3MF, /* .3mf: for printers, with colours; 1 angstrom is 1 millimetre */
+    OVOID_EXPORT_MSMS /* .vert, and beside it .face: as MSMS writes them, with the nearest atom */
 } ovoid_export_format;
+
+/* What the colours of a surface stand for. */
+typedef enum ovoid_colouring {
+    OVOID_COLOUR_AUTO = 0, /* the difference where there are a molecule and a model, else nothing */
+    OVOID_COLOUR_PLAIN,    /* nothing */
+    OVOID_COLOUR_DIFFERENCE, /* how far outside (red) or inside (blue) the model's surface lies */
+    OVOID_COLOUR_CHAIN,      /* the chain of the nearest atom, that whose Gaussian is the largest */
+    OVOID_COLOUR_RESIDUE,    /* its residue */
+    OVOID_COLOUR_ELLIPSOID   /* the ellipsoid that it counts for */
+} ovoid_colouring;
 
 typedef struct ovoid_export_options {
     size_t size;
@@ -47,6 +62,7 @@ typedef struct ovoid_export_options {
                              the surfaces stay within, rounded up */
     double max_triangles; /* of a surface in a page: the spacing becomes larger where it would have
                              more */
+    ovoid_colouring colouring; /* of a surface */
 } ovoid_export_options;
 
 #define OVOID_DEFAULT_MAP_GIGABYTES 1.0

@@ -14,7 +14,7 @@ for command in "export --help" "export -h" "help export"; do
     expect_code 0
     expect_silent
     for text in "Usage: ovoid export INPUT" "Exit codes:" "Examples:" "OVOID_DEVICE" ".bild" ".cxc" \
-        ".py" ".gmm" ".json" ".xyz" ".lmp" ".pdb" ".gltf" ".cif" ".mrc" ".dx" ".html" --output --as --format --device --quiet --isovalue \
+        ".py" ".gmm" ".json" ".xyz" ".lmp" ".pdb" ".gltf" ".cif" ".mrc" ".dx" ".html" ".3mf" ".vert" --colour-by --output --as --format --device --quiet --isovalue \
         --spacing --decay --colour --opacity; do
         expect_out "$text"
     done
@@ -67,12 +67,14 @@ wrong() {
 wrong 2 "which model?"
 wrong 2 "one input at a time, but 'b' follows 'm.ovoid'" m.ovoid b -o m.py
 wrong 2 "a molecule and one model at a time, but 'n.ovoid' follows 'm.ovoid'" a.xyzr m.ovoid n.ovoid -o m.cif
+wrong 2 "--colour-by takes difference, chain, residue, ellipsoid or none, not 'atom'" a.xyzr -o a.ply --colour-by atom
+wrong 2 "one input at a time, but 'n.ovoid' follows 'm.ovoid'" m.ovoid n.ovoid -o m.ply
 wrong 2 "only one input can come from standard input" - - -o m.html
 wrong 2 "where to?" m.ovoid
 wrong 2 "are the same file" m.ovoid -o ./m.ovoid
-wrong 2 "one of .bild, .cxc, .py, .gmm, .json, .xyz, .lmp, .pdb, .gltf, .cif, .mrc, .map, .ccp4, .dx, .html" m.ovoid -o m.xtc
+wrong 2 "one of .bild, .cxc, .py, .gmm, .json, .xyz, .lmp, .pdb, .gltf, .cif, .mrc, .map, .ccp4, .dx, .ply, .glb, .3mf, .vert, .html" m.ovoid -o m.xtc
 wrong 2 "name a format" m.ovoid -o -
-wrong 2 "--as takes bild, cxc, pymol, gmm, json, ccp4, dx, html, ihm, xyz, lammps, anisou or splat, not 'xtc'" m.ovoid -o - --as xtc
+wrong 2 "--as takes bild, cxc, pymol, gmm, json, ccp4, dx, html, ihm, xyz, lammps, anisou, splat, ply, glb, 3mf or msms, not 'xtc'" m.ovoid -o - --as xtc
 wrong 2 "--colour takes six hexadecimal digits such as 4d8ccc, not 'red'" m.ovoid -o m.py --color red
 wrong 2 "--opacity is 2, but must be at most 1" m.ovoid -o m.py --opacity 2
 for name in r.mrc r.MRC r.dx r.py; do
@@ -96,6 +98,11 @@ if [ -w /dev/full ]; then
 fi
 
 need_device
+wrong 2 "MSMS's files are two" a.xyzr -o - --as msms
+wrong 2 "they take a molecule" m.ovoid -o m.vert
+wrong 2 "colours by difference take a molecule and a model" a.xyzr -o a.ply --colour-by difference
+wrong 2 "colours by chain or residue take a molecule" m.ovoid -o m.ply --colour-by residue
+wrong 2 "does not name its residues: no colours by chain" a.xyzr -o a.ply --colour-by chain
 wrong 5 "no such device" a.xyzr -o a.mrc --device "no such device"
 wrong 6 "choose a larger spacing" a.xyzr -o a.mrc --spacing 1e-5
 # A map that would be mostly nothing is not written without a word: its size is named.

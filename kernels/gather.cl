@@ -55,3 +55,27 @@ __kernel void scatter_target(const uint packs, __global const uint *restrict lis
     copy_sixteen(some, 3 * from + 1, high, to);
     copy_sixteen(some, 3 * from + 2, weight, to);
 }
+
+/* Lists the packs that some term reaches, in ascending order: list[0] of them, from list[1] on.
+ * start: as field() has it. One work-group of OV_SCAN_GROUP work-items at most. */
+__kernel void list_reached(const uint packs, __global const uint *restrict start,
+                           __global uint *restrict list) {
+    __local uint scratch[OV_SCAN_GROUP];
+    const uint at = get_local_id(0), size = get_local_size(0), each = (packs + size - 1) / size;
+    const uint first = min(at * each, packs), end = min(first + each, packs);
+    if (get_group_id(0) > 0)
+        return;
+    uint reached = 0;
+    for (uint k = first; k < end; ++k)
+        reached += start[k + 1] > start[k] ? 1 : 0;
+    scratch[at] = reached;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    uint to = 1;
+    for (uint k = 0; k < at; ++k)
+        to += scratch[k];
+    for (uint k = first; k < end; ++k)
+        if (start[k + 1] > start[k])
+            list[to++] = k;
+    if (at == size - 1)
+        list[0] = to - 1;
+}

@@ -8,6 +8,7 @@
  * OVOID_FAULTS=1 takes every call by itself, and does the work again after two in ten, which takes
  * hours for the fits; a larger number, each of so many (bench/results/faults.csv). Without it, all
  * of few fail, and of many one of each function's by itself, and some with all that follow.
+ * OVOID_FAULTS_WORK="fit by l1" takes the works alone whose names begin so.
  */
 #include "faults.h"
 #include "once.h"
@@ -376,10 +377,13 @@ static void try_some(const work *w, fault_kind kind, size_t few, uint64_t *wante
 
 static void try_all(fault_kind kind, const char *what, size_t few) {
     const char *const wish = getenv("OVOID_FAULTS");
+    const char *const only = getenv("OVOID_FAULTS_WORK");
     const size_t step = wish ? strtoul(wish, NULL, 10) : 0;
     for (const work *w = works; w < works + WORKS; ++w) {
         tally t = {0};
         uint64_t wanted = 0;
+        if (only && strncmp(w->name, only, strlen(only)) != 0)
+            continue;
         if ((kind == FAULT_OPENCL && w->host) || (kind == FAULT_NEW && w->run != read_structure))
             continue;
         try_failure(w, kind, 0, false, false, &wanted, &t); /* what happens once in a process */

@@ -368,6 +368,8 @@ static void frames(void **state) {
         assert_true((double)result.ellipsoids <= MORE * (double)alone.ellipsoids + 1.0);
         if (n == 0)
             assert_true(result.ellipsoids <= before.ellipsoids);
+        if (n < 3) /* what a frame is for */
+            assert_true(3 * result.iterations < alone.iterations);
         ovoid_model_destroy(&model);
         ovoid_model_destroy(&other);
         ovoid_molecule_destroy(&moved);
@@ -521,7 +523,8 @@ static void each_question_stops(void **state) {
         ovoid_model_destroy(&model);
         for (unsigned at = 1; at <= all.asked; at += 1 + all.asked / 30, ++tried)
             held += expect_stop(*state, molecule, fitter, &goals[n], at);
-        held += expect_stop(*state, molecule, fitter, &goals[n], all.asked);
+        /* Memory that stops leave behind may save a question or two about its size. */
+        held += expect_stop(*state, molecule, fitter, &goals[n], all.asked - 3);
         print_message("goal %zu: %u questions, %u stops, %u held\n", n, all.asked, tried + 1, held);
         assert_true(held > 0 && held < tried);
         test_check(*state, ovoid_fitter_reach(*state, fitter, &goals[n], &model, NULL));
@@ -640,6 +643,9 @@ static void errors_leave_it_usable(void **state) {
     ovoid_context_destroy(&other);
     test_refused(*state, ovoid_fitter_reach(*state, none, &options, &model, NULL),
                  OVOID_ERROR_ARGUMENT, "is gone");
+    test_refused(*state, ovoid_fitter_start_from(*state, none, alone), OVOID_ERROR_ARGUMENT,
+                 "the context of this fitter is gone");
+    test_refused(*state, ovoid_fitter_move(*state, none, xyz), OVOID_ERROR_ARGUMENT, "is gone");
     ovoid_fitter_destroy(&none);
     options.decay = -1.0;
     test_refused(*state, ovoid_fitter_create(*state, molecule, &options, &none),

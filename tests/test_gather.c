@@ -242,6 +242,37 @@ static void near_packs_are_found(void **state) {
     ov_points_destroy(&points);
 }
 
+/* Packs with terms, few and many of them, more than the last time and fewer. */
+static void reached_packs_are_listed(void **state) {
+    static const size_t one_in[] = {2, 1000, 1, 1000000, 3};
+    const size_t packs = test_size(5000, 300);
+    test_random random = {5};
+    ov_lists lists = {.packs = packs};
+    ov_buffer list = {0};
+    ov_packs found = {0};
+    uint32_t *const start = test_alloc(packs + 1, sizeof *start);
+    uint32_t *const wanted = test_alloc(packs, sizeof *wanted);
+    for (size_t n = 0; n < sizeof one_in / sizeof *one_in; ++n) {
+        size_t count = 0;
+        for (size_t k = 0; k < packs; ++k) {
+            const bool some = random_bits(&random) % one_in[n] == 0;
+            start[k + 1] = start[k] + (some ? 1 + (uint32_t)(random_bits(&random) % 3) : 0);
+            if (some)
+                wanted[count++] = (uint32_t)k;
+        }
+        test_check(*state, ov_buffer_put(*state, &lists.pack_start, start,
+                                         (packs + 1) * sizeof *start, "starts"));
+        test_check(*state, ov_packs_reached(*state, &lists, &list, &found));
+        assert_int_equal(found.count, count);
+        assert_memory_equal(found.pack, wanted, count * sizeof *wanted);
+    }
+    free(start);
+    free(wanted);
+    ov_packs_destroy(&found);
+    ov_buffer_destroy(&list);
+    ov_lists_destroy(&lists);
+}
+
 static void lists_are_tidied(void **state) {
     (void)state;
     uint32_t some[] = {7, 3, 7, UINT32_MAX, 0, 3, 0, 7};
@@ -254,7 +285,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_are_gathered),   cmocka_unit_test(targets_are_gathered),
         cmocka_unit_test(targets_are_scattered), cmocka_unit_test(near_packs_are_found),
-        cmocka_unit_test(lists_are_tidied),
+        cmocka_unit_test(lists_are_tidied),      cmocka_unit_test(reached_packs_are_listed),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

@@ -185,6 +185,11 @@ ovoid_status ov_lists_end(ovoid_context *context, ov_lists *lists, bool *whole);
 bool ov_lists_built(const ov_lists *lists);
 void ov_lists_destroy(ov_lists *lists);
 
+/* The packs that terms reach, ascending, from lists that were built with those of packs. list: room
+ * on the device. */
+ovoid_status ov_packs_reached(ovoid_context *context, const ov_lists *lists, ov_buffer *list,
+                              ov_packs *found);
+
 /* ---- operations --------------------------------------------------------------------------- */
 
 typedef struct ov_operations {

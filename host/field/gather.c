@@ -77,6 +77,50 @@ cleanup:
     return status;
 }
 
+/* ---- packs that are reached ----------------------------------------------------------------- */
+
+/* Read at once, so that one round trip is enough as a rule: this and a quarter more than there were
+ * the last time. */
+#define EXPECTED 255
+
+static ovoid_status read_list(ovoid_context *context, const ov_buffer *list, size_t packs,
+                              ov_packs *found) {
+    ovoid_status status = OVOID_OK;
+    size_t expected = EXPECTED + found->count + found->count / 4;
+    expected = expected < packs ? expected : packs;
+    OV_TRY(ov_grow(context, &found->pack, &found->capacity, 1 + expected, sizeof *found->pack,
+                   "packs"));
+    OV_TRY(ov_buffer_read(context, list, 0, found->pack, (1 + expected) * sizeof *found->pack));
+    found->count = found->pack[0];
+    if (found->count > expected) {
+        OV_TRY(ov_grow(context, &found->pack, &found->capacity, 1 + found->count,
+                       sizeof *found->pack, "packs"));
+        OV_TRY(ov_buffer_read(context, list, 0, found->pack,
+                              (1 + found->count) * sizeof *found->pack));
+    }
+    memmove(found->pack, found->pack + 1, found->count * sizeof *found->pack);
+cleanup:
+    return status;
+}
+
+ovoid_status ov_packs_reached(ovoid_context *context, const ov_lists *lists, ov_buffer *list,
+                              ov_packs *found) {
+    ovoid_status status = OVOID_OK;
+    ov_kernel kernel = {0};
+    ov_device *device;
+    const cl_uint packs = (cl_uint)lists->packs;
+    OV_TRY(ov_device_get(context, &device));
+    const size_t group = device->shape.lanes == 1 ? 1 : OV_SCAN_GROUP;
+    OV_TRY(ov_kernel_create(context, "gather", "list_reached", &kernel));
+    OV_TRY(ov_buffer_reserve(context, list, (1 + lists->packs) * sizeof(cl_uint), "packs"));
+    OV_TRY(OV_LAUNCH(context, &kernel, group, group, OV_ARG(packs),
+                     OV_ARG(lists->pack_start.memory), OV_ARG(list->memory)));
+    OV_TRY(read_list(context, list, lists->packs, found));
+cleanup:
+    ov_kernel_destroy(&kernel);
+    return status;
+}
+
 void ov_packs_destroy(ov_packs *packs) {
     free(packs->pack);
     *packs = (ov_packs){0};

@@ -353,6 +353,9 @@ static ovoid_status move_model(const ovoid_fitter *fitter, const double *after, 
     memcpy(found->owner, from->owner, fitter->atoms * sizeof *from->owner);
     OV_TRY(ov_move_with_atoms(fitter->context, fitter->xyzr, after, fitter->atoms, found->owner,
                               found->quadrics, found->count));
+    found->tolerance = from->tolerance;
+    found->fewest = from->fewest;
+    found->moved = true;
 cleanup:
     return status;
 }

@@ -113,6 +113,7 @@ float *ov_setting_floats(ovoid_context *context, const ov_setting *setting, ov_r
 size_t ov_layout_of_host(uint32_t wanted[OV_LAYOUT_MOST]);
 
 ovoid_status ov_check_layout(ov_checking *c);
+ovoid_status ov_check_tree(ov_checking *c);
 ovoid_status ov_check_lists(ov_checking *c);
 ovoid_status ov_check_field(ov_checking *c);
 ovoid_status ov_check_moments(ov_checking *c);

@@ -64,6 +64,39 @@ cleanup:
     return status;
 }
 
+/* ---- the tree over packs ------------------------------------------------------------------ */
+
+/* What the device makes of boxes is what the host makes, bit by bit: three levels, the last group
+ * of each not full. */
+ovoid_status ov_check_tree(ov_checking *c) {
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = c->context;
+    const size_t count = ov_check_size(c, 70003, 307);
+    ov_random random = {23};
+    ov_tree host = {0}, device = {0};
+    ov_buffer leaves = {0}, boxes = {0};
+    size_t floats = 0;
+    float *wanted = NULL, *got = NULL;
+    float *const leaf = ov_random_floats(context, &random, 6 * count, -9.0, 9.0);
+    if (!leaf)
+        return OVOID_ERROR_MEMORY;
+    for (size_t k = 0; k < 6 * count; ++k)
+        if (k % 6 >= 3)
+            leaf[k] = leaf[k - 3] + fabsf(leaf[k]);
+    OV_TRY(ov_tree_build(context, leaf, count, &host, &wanted, &floats));
+    OV_TRY(ov_put_floats(context, &leaves, leaf, 6 * count));
+    OV_TRY(ov_tree_grow(context, &leaves, count, &device, &boxes));
+    OV_TRY(ov_read_words(context, &boxes, floats, &got));
+    ov_expect_same(c, got, wanted, floats, "tree: side of a box");
+cleanup:
+    free(leaf);
+    free(wanted);
+    free(got);
+    ov_buffer_destroy(&leaves);
+    ov_buffer_destroy(&boxes);
+    return status;
+}
+
 /* ---- lists -------------------------------------------------------------------------------- */
 
 typedef struct pairs {

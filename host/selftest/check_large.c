@@ -10,19 +10,48 @@
 
 /* ---- points ------------------------------------------------------------------------------- */
 
+/* Terms that reach a small part of the cube each, as those of a molecule do: a term that reaches
+ * all of so many packs has loops that some drivers end (llvmpipe, Mesa 22.3: 65535 rounds). */
+enum { FEW = 150, SOME_POINTS = 29, LAST_POINTS = 5000 };
+#define OUTER 30.0 /* angstrom, half the cube */
+#define CUTOFF 1e-7
+#define NARROW 0.8     /* angstrom^-2, more of each decay rate */
+#define CUT_FIELD 2e-6 /* what terms below the cut-off come to */
+
+static void narrow(ov_quadric *quadric) {
+    quadric->a[0] += NARROW;
+    quadric->a[3] += NARROW;
+    quadric->a[5] += NARROW;
+}
+
 ovoid_status ov_check_many_points(ov_checking *c) {
-    ovoid_status status = OVOID_OK;
+    const size_t points = ((size_t)1 << 21) + 77;
+    ovoid_status status = OVOID_ERROR_MEMORY;
+    ov_random random = {30};
     ov_setting s = {0};
     ov_buffer value = {0};
+    ov_quadric terms[FEW];
     float *got = NULL;
-    OV_TRY(ov_setting_create(c->context, 30, 5, ((size_t)1 << 21) + 77, 20.0, 30.0, 1e-37, &s));
+    double *const xyz = ov_alloc(c->context, 3 * points, sizeof *xyz, "points of a check");
+    if (!xyz)
+        goto cleanup;
+    for (size_t i = 0; i < FEW; ++i) {
+        ov_random_quadric(&random, OUTER, &terms[i]);
+        narrow(&terms[i]);
+    }
+    for (size_t k = 0; k < 3 * points; ++k)
+        xyz[k] = ov_random_uniform(&random, -OUTER, OUTER);
+    OV_TRY(ov_setting_of(c->context, terms, FEW, xyz, points, CUTOFF, &s));
     OV_TRY(ov_field(c->context, &s.operations, &s.points, &s.terms, &s.lists, &value));
     OV_TRY(ov_read_words(c->context, &value, s.places, &got));
-    for (size_t k = 0; k < s.places; ++k)
-        ov_expect_close(c, got[k], ov_twin_field(s.quadrics, s.count, s.xyz + 3 * k), TOLERANCE,
-                        "field, many points: value", k);
+    for (size_t k = 0; k < s.places; k += k + LAST_POINTS < s.places ? SOME_POINTS : 1) {
+        const ov_twin_sum wanted = ov_twin_field(s.quadrics, FEW, s.xyz + 3 * k);
+        ov_expect_near(c, got[k], wanted.value, TOLERANCE * FLT_EPSILON * wanted.scale + CUT_FIELD,
+                       "field, many points: value", k);
+    }
 cleanup:
     free(got);
+    free(xyz);
     ov_buffer_destroy(&value);
     ov_setting_destroy(&s);
     return status;
@@ -33,7 +62,6 @@ cleanup:
 /* Terms on a lattice: with a team of 32 work-items each they are more than 2^21 items. */
 enum { ROW = 42, TERMS = ROW * ROW * ROW, POINTS = 50001, STRIDE = 997 };
 #define APART 2.0
-#define CUTOFF 1e-7
 #define HALF (0.5 * APART * ROW)
 #define LEFT_OUT 2e-5 /* what terms below the cut-off come to, and moments of them */
 
@@ -47,10 +75,9 @@ static ovoid_status place_terms(ovoid_context *context, ov_setting *s) {
     for (size_t i = 0; i < TERMS; ++i) {
         const size_t at[3] = {i % ROW, i / ROW % ROW, i / (ROW * ROW)};
         ov_random_quadric(&random, 0.0, &quadrics[i]);
-        for (size_t k = 0; k < 3; ++k) {
+        narrow(&quadrics[i]);
+        for (size_t k = 0; k < 3; ++k)
             quadrics[i].centre[k] = APART * (double)at[k] - HALF;
-            quadrics[i].a[k == 0 ? 0 : k == 1 ? 3 : 5] += 0.8;
-        }
     }
     for (size_t k = 0; k < 3 * POINTS; ++k)
         xyz[k] = ov_random_uniform(&random, -HALF, HALF);

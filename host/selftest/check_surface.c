@@ -53,14 +53,17 @@ static ovoid_status make_noise(ov_checking *c, noise *n) {
     return OVOID_OK;
 }
 
+/* About an origin: a light mesh, whose vertices the device places. NULL: a full one. */
 static ovoid_status march(ov_checking *c, const noise *n, ovoid_vertex_rule rule,
-                          ovoid_mesh **mesh) {
+                          const double *origin, ovoid_mesh **mesh) {
     static const uint64_t limit[3] = {8, 8, 8}; /* several pieces, with seams */
     ovoid_mesh_options options;
     ovoid_mesh_options_init(&options, sizeof options);
     options.isovalue = ISOVALUE;
     options.spacing = SPACING;
     options.vertices = rule;
+    if (origin)
+        return ov_march_light(c->context, n->bodies, n->count, &options, limit, origin, NULL, mesh);
     return ov_march(c->context, n->bodies, n->count, &options, limit, mesh);
 }
 
@@ -140,11 +143,29 @@ static void expect_surface(ov_checking *c, const ovoid_mesh *mesh, const noise *
     }
 }
 
+/* The light mesh is the full one, rounded. */
+static void expect_light_mesh(ov_checking *c, const ovoid_mesh *full, const ovoid_mesh *light) {
+    if (!ov_expect(c, light->vertices == full->vertices && light->triangles == full->triangles,
+                   "march: a light mesh of %zu vertices and %zu triangles, not %zu and %zu",
+                   light->vertices, light->triangles, full->vertices, full->triangles))
+        return;
+    for (size_t k = 0; k < 3 * full->vertices; ++k) {
+        ov_expect_near(c, light->offsets[k], full->xyz[k] - light->origin[k % 3], 1e-5,
+                       "march_place: coordinate", k);
+        ov_expect_near(c, light->normals[k], full->normals[k], 1e-5, "march_place: normal", k);
+    }
+    for (size_t k = 0; k < 3 * full->triangles; ++k)
+        ov_expect(c, light->corners[k] == full->corners[k],
+                  "march_triangles: corner %zu of the light mesh is %u, not %u", k,
+                  (unsigned)light->corners[k], (unsigned)full->corners[k]);
+}
+
 ovoid_status ov_check_mesh(ov_checking *c) {
     ovoid_status status = OVOID_OK;
     noise n = {0};
     ov_twin_mesh twin = {0};
-    ovoid_mesh *linear = NULL, *exact = NULL;
+    const double origin[3] = {0.3, -40.0, 7.0};
+    ovoid_mesh *linear = NULL, *exact = NULL, *light = NULL;
     OV_TRY(make_noise(c, &n));
     const int64_t low = -(int64_t)n.box / 2;
     if (!ov_twin_march(n.quadrics, n.count, ISOVALUE, SPACING, (const int64_t[3]){low, low, low},
@@ -152,15 +173,18 @@ ovoid_status ov_check_mesh(ov_checking *c) {
         status = ov_fail(c->context, OVOID_ERROR_MEMORY, "out of memory for a check's mesh");
         goto cleanup;
     }
-    OV_TRY(march(c, &n, OVOID_VERTEX_LINEAR, &linear));
+    OV_TRY(march(c, &n, OVOID_VERTEX_LINEAR, NULL, &linear));
     OV_TRY(compare_mesh(c, linear, &twin));
-    OV_TRY(march(c, &n, OVOID_VERTEX_EXACT, &exact));
+    OV_TRY(march(c, &n, OVOID_VERTEX_EXACT, NULL, &exact));
     ov_expect(c, exact->vertices == twin.vertices, "march: %zu exact vertices, not %zu",
               exact->vertices, twin.vertices);
     expect_surface(c, exact, &n);
+    OV_TRY(march(c, &n, OVOID_VERTEX_EXACT, origin, &light));
+    expect_light_mesh(c, exact, light);
 cleanup:
     ovoid_mesh_destroy(&linear);
     ovoid_mesh_destroy(&exact);
+    ovoid_mesh_destroy(&light);
     ov_twin_mesh_destroy(&twin);
     destroy_noise(&n);
     return status;

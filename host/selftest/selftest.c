@@ -12,6 +12,7 @@
 
 static const ov_check checks[] = {
     {"layout", "layout", true, true, ov_check_layout},
+    {"tree", "tree_leaves tree_level", true, true, ov_check_tree},
     {"lists", "packs_of_terms scan_lists hand_out_entries lists_of_packs", true, true,
      ov_check_lists},
     {"field", "field field_polynomial field_gradient", true, false, ov_check_field},
@@ -23,8 +24,8 @@ static const ov_check checks[] = {
     {"solver", "solve_start solve_product solve_update solve_direction solve_step", true, false,
      ov_check_solver},
     {"mesh",
-     "march_signs march_count march_get march_put march_vertices march_boxes march_triangles "
-     "march_refine",
+     "march_signs march_count march_number march_get march_put march_vertices march_boxes "
+     "march_triangles march_refine march_place",
      true, false, ov_check_mesh},
     {"distances", "pack_leaves distances", true, false, ov_check_distances},
     {"picture", "trace trace_ellipsoids compare shade", false, false, ov_check_picture},

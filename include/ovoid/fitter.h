@@ -77,8 +77,10 @@ OVOID_API ovoid_status ovoid_fitter_start_from(ovoid_context *context, ovoid_fit
  * order of the molecule; their radii stay. The last model that method adaptive reached (or that was
  * given as a start after that) goes along and is what method adaptive begins with from now on: each
  * ellipsoid with the atoms that it owns, turned as the atoms about it. Points, target and meshes
- * are made anew by the next fit; kernels and buffers are kept. After an error all is what it was.
- */
+ * are made anew by the next fit; kernels and buffers are kept. To the same tolerance as in the last
+ * frame the next fit changes as little as it can: where the model is off, ellipsoids are first
+ * refined, then added, and merged only down to 5 % more than frames before could do with. After an
+ * error all is what it was. */
 OVOID_API ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter,
                                          const double *xyz);
 

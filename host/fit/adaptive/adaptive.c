@@ -178,7 +178,9 @@ static ovoid_verdict verdict_of(const ov_adaptive *f, size_t count, const ov_jud
 
 /* Hands over the trial's owners and the quadrics f->quadrics, which are its. */
 static ovoid_status hand_over(const ov_adaptive *f, const ov_trial *t, ov_found *found) {
-    ov_found made = {.count = t->count};
+    ov_found made = {.count = t->count,
+                     .tolerance = f->fewest > 0 ? f->options->adaptive.tolerance : 0.0,
+                     .fewest = f->fewest < t->count ? f->fewest : t->count};
     made.quadrics = ov_alloc(f->context, t->count, sizeof *made.quadrics, "ellipsoids");
     made.owner = ov_alloc(f->context, f->atoms, sizeof *made.owner, "owners");
     if (!made.quadrics || !made.owner) {
@@ -294,6 +296,7 @@ ovoid_status ov_adaptive_check(ovoid_context *context, const ovoid_adaptive_opti
 static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const ov_found *start) {
     f->options = options;
     f->start = start;
+    f->fewest = 0;
     f->held = NULL;
     f->steps = 0;
     f->misfit = 0.0;
@@ -301,6 +304,8 @@ static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const
     f->width_max = ov_tuned.refine_width * sqrt(0.5 / options->decay);
     f->solver_before = ov_adaptive_solver_iterations(f);
     ov_refiner_forget(&f->refiner);
+    f->refiner.solver.last = 0; /* so that the same is launched, too */
+    f->local.refiner.solver.last = 0;
 }
 
 ovoid_status ov_adaptive_reach(ov_adaptive *f, const ovoid_fit_options *options,

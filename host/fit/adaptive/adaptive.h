@@ -14,6 +14,9 @@ typedef struct ov_found {
     ov_quadric *quadrics;
     size_t count;
     uint32_t *owner;
+    double tolerance; /* that it was shrunk for, 0: for none */
+    size_t fewest;    /* ellipsoids that this took, in this frame or one before; 0: for none */
+    bool moved;       /* of a start: the last frame's model, where the atoms have gone */
 } ov_found;
 
 void ov_found_destroy(ov_found *found);

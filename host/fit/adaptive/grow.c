@@ -9,9 +9,10 @@
 /* What growing works with. */
 typedef struct growth {
     ov_places places;
-    uint32_t *before; /* per spot: how often its place was met before */
-    bool *chosen;     /* ellipsoids */
-    uint32_t *felt;   /* those at a place */
+    uint32_t *before; /* per spot: how often its place was met before, patience included */
+    uint32_t patience;
+    bool *chosen;   /* ellipsoids */
+    uint32_t *felt; /* those at a place */
 } growth;
 
 /* The ellipsoid with the largest value at a point of those that are not chosen yet: of those felt
@@ -42,6 +43,14 @@ static void split_one(ov_adaptive *f, ov_trial *t, size_t i) {
     ++t->count;
 }
 
+/* How many ellipsoids are split at a spot. */
+static int splits_of(const growth *g, size_t n) {
+    if (g->before[n] < g->patience)
+        return 0;
+    const uint32_t met = g->before[n] - g->patience;
+    return met < ov_tuned.grow_split_two ? 1 : met < ov_tuned.grow_rebuild ? 2 : 0;
+}
+
 /* Splits what is largest at the places that are not known for long. f->twin then leads from each
  * half to the other. */
 static ovoid_status split(ov_adaptive *f, ov_trial *t, const ov_spots *spots, growth *g) {
@@ -53,9 +62,7 @@ static ovoid_status split(ov_adaptive *f, ov_trial *t, const ov_spots *spots, gr
     OV_TRY(ov_reach_create(f->context, t->x, whole,
                            log(ov_tuned.grow_matters * f->options->isovalue), &reach));
     for (size_t n = 0; n < spots->count; ++n) {
-        const int each = g->before[n] < ov_tuned.grow_split_two ? 1
-                         : g->before[n] < ov_tuned.grow_rebuild ? 2
-                                                                : 0;
+        const int each = splits_of(g, n);
         for (int k = 0; k < each && t->count < f->atoms; ++k) {
             const size_t i = ellipsoid_at(&reach, g->chosen, spots->spot[n].at, g->felt);
             if (i == whole)
@@ -94,11 +101,13 @@ static ovoid_status rebuild(ov_adaptive *f, ov_trial *t, const ov_spots *spots, 
     uint32_t longest = 0;
     for (size_t n = 0; n < spots->count; ++n)
         longest = g->before[n] > longest ? g->before[n] : longest;
+    longest -= longest > g->patience ? g->patience : longest;
     for (uint32_t met = ov_tuned.grow_rebuild; met <= ov_tuned.grow_last && met <= longest; ++met) {
         const double share = met < ov_tuned.grow_atoms
                                  ? ov_tuned.grow_matters
                                  : ov_tuned.grow_matters * pow(0.25, met - ov_tuned.grow_atoms);
-        OV_TRY(choose(f, t, spots, met, met == ov_tuned.grow_last ? UINT32_MAX : met, share, g));
+        OV_TRY(choose(f, t, spots, g->patience + met,
+                      met == ov_tuned.grow_last ? UINT32_MAX : g->patience + met, share, g));
         OV_TRY(ov_adaptive_rebuild(
             f, t, met < ov_tuned.grow_atoms ? ov_tuned.grow_rebuild_times : (double)f->atoms,
             g->chosen));
@@ -129,6 +138,7 @@ ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing
     growth g = {.before = ov_alloc(f->context, f->capacity, sizeof *g.before, "places"),
                 .chosen = ov_alloc(f->context, f->capacity, sizeof *g.chosen, "ellipsoids"),
                 .felt = ov_alloc(f->context, f->capacity, sizeof *g.felt, "ellipsoids")};
+    g.patience = how->patience;
     if (!g.before || !g.chosen || !g.felt) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;

@@ -38,13 +38,21 @@ cleanup:
 static ovoid_status find_packs(ov_local *l, const ov_points *points) {
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = l->refiner.context;
-    l->reached.terms_only = true;
-    OV_TRY(ov_lists_build(context, &l->reached, points, &l->moving, 0.0));
-    OV_TRY(ov_grow(context, &l->packs.pack, &l->packs.capacity, l->reached.items,
-                   sizeof *l->packs.pack, "packs"));
-    OV_TRY(ov_buffer_read(context, &l->reached.term_item, 0, l->packs.pack,
-                          l->reached.items * sizeof *l->packs.pack));
-    l->packs.count = ov_packs_tidy(l->packs.pack, l->reached.items);
+    bool begun, whole = true;
+    l->reached.packs_only = true;
+    begun = ov_lists_built(&l->reached);
+    OV_TRY(begun ? ov_lists_begin(context, &l->reached, points, &l->moving, 0.0)
+                 : ov_lists_build(context, &l->reached, points, &l->moving, 0.0));
+    status = ov_packs_reached(context, &l->reached, &l->list, &l->packs);
+    if (begun && status == OVOID_OK)
+        status = ov_lists_end(context, &l->reached, &whole);
+    else if (begun)
+        ov_later_end(context, &l->reached.later);
+    OV_TRY(status);
+    if (!whole) { /* there were more pairs than ever before */
+        OV_TRY(ov_lists_build(context, &l->reached, points, &l->moving, 0.0));
+        OV_TRY(ov_packs_reached(context, &l->reached, &l->list, &l->packs));
+    }
 cleanup:
     return status;
 }
@@ -52,17 +60,20 @@ cleanup:
 /* ---- the target ------------------------------------------------------------------------------ */
 
 /* Fixed ellipsoids leave that much less of the target to the others. */
-static ovoid_status take_target(ov_local *l, const ov_target *target) {
+static ovoid_status take_target_with(ov_local *l, const ov_target *target, bool begin,
+                                     bool *whole) {
     ovoid_status status = OVOID_OK;
+    const bool begun = begin && ov_lists_built(&l->lists);
     ovoid_context *const context = l->refiner.context;
     ov_kernel kernel = {0};
     ov_device *device;
     const cl_uint packs = (cl_uint)l->packs.count;
     ov_target *const own = &l->target;
-    l->lists.packs_only = true;
+    *whole = true;
     OV_TRY(ov_device_get(context, &device));
     OV_TRY(ov_kernel_create(context, "gather", "gather_target", &kernel));
-    OV_TRY(ov_lists_build(context, &l->lists, &l->points, &l->still, 0.0));
+    OV_TRY(begun ? ov_lists_begin(context, &l->lists, &l->points, &l->still, 0.0)
+                 : ov_lists_build(context, &l->lists, &l->points, &l->still, 0.0));
     OV_TRY(ov_field(context, &l->refiner.operations, &l->points, &l->still, &l->lists, &l->value));
     OV_TRY(ov_target_reserve(context, own, l->packs.count));
     OV_TRY(OV_LAUNCH(context, &kernel, packs, ov_item_group(device), OV_ARG(packs),
@@ -73,7 +84,18 @@ static ovoid_status take_target(ov_local *l, const ov_target *target) {
     own->points = &l->points;
 cleanup:
     ov_kernel_destroy(&kernel);
+    if (begun && status == OVOID_OK)
+        status = ov_lists_end(context, &l->lists, whole);
+    else if (begun)
+        ov_later_end(context, &l->lists.later);
     return status;
+}
+
+static ovoid_status take_target(ov_local *l, const ov_target *target) {
+    bool whole;
+    l->lists.packs_only = true;
+    const ovoid_status status = take_target_with(l, target, true, &whole);
+    return status != OVOID_OK || whole ? status : take_target_with(l, target, false, &whole);
 }
 
 /* ---- the step -------------------------------------------------------------------------------- */

@@ -11,7 +11,7 @@
 typedef struct ov_local {
     ov_refiner refiner; /* its context is set by who makes this */
     ov_terms moving, still;
-    ov_lists reached; /* of those that move, over all points: their packs alone */
+    ov_lists reached; /* of those that move, over all points */
     ov_lists lists;   /* of those that stay still, over the points kept: these alone */
     ov_points points; /* the packs that may be reached */
     ov_target target; /* of these, less the field of those that stay still */

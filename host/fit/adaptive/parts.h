@@ -26,6 +26,7 @@ struct ov_adaptive {
     bool prepared;                    /* points, target and judge are there */
     const ovoid_fit_options *options; /* of this search */
     const ov_found *start;            /* NULL: the atoms */
+    size_t fewest;                    /* ellipsoids that the tolerance takes; 0: not known */
     ov_samples samples;
     ov_target target;
     ov_reduction *reduction[OV_STARTS];

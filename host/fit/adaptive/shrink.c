@@ -238,7 +238,7 @@ static void choose_share(shrinking *s, size_t tries, size_t held) {
 
 /* Whether the last rounds were worth their while: too little was gained in a few of them and in
  * enough tries, which in a small molecule take more rounds. */
-static bool is_idle(shrinking *s, size_t tries, size_t count, uint32_t effort) {
+static bool is_idle(shrinking *s, const ov_shrinking *how, size_t tries, size_t count) {
     ++s->idle_rounds;
     s->idle_tries += tries;
     if ((double)count <= (1.0 - ov_tuned.shrink_gain) * (double)s->milestone) {
@@ -246,17 +246,17 @@ static bool is_idle(shrinking *s, size_t tries, size_t count, uint32_t effort) {
         s->idle_rounds = 0;
         s->idle_tries = 0;
     }
-    return s->idle_rounds >= ov_tuned.shrink_idle_rounds * effort &&
-           s->idle_tries >= ov_tuned.shrink_idle_tries * effort;
+    return s->idle_rounds >= how->idle_rounds && s->idle_tries >= how->idle_tries;
 }
 
-ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
+ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, const ov_shrinking *how,
+                                ov_trial *best) {
     ovoid_status status = OVOID_OK;
     shrinking s;
     bool idle = false;
     OV_TRY(shrinking_create(f, &s));
     s.milestone = best->count;
-    while (!idle && best->count > 1) {
+    while (!idle && best->count > how->least) {
         const size_t before = best->count;
         OV_TRY(merge(f, best, &s));
         const size_t tries = before - s.next.count;
@@ -271,7 +271,7 @@ ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best
         if (s.next.count < before && ov_trial_holds(&s.next, tolerance))
             ov_trial_swap(&s.next, best);
         choose_share(&s, tries, before - best->count);
-        idle = is_idle(&s, tries, best->count, f->options->adaptive.effort);
+        idle = is_idle(&s, how, tries, best->count);
     }
 cleanup:
     shrinking_destroy(&s);

@@ -51,12 +51,18 @@ cleanup:
     return status;
 }
 
+/* Whether the search begins with the model of the last frame, shrunk for the same. */
+static bool is_frame(const ov_adaptive *f) {
+    return f->start && f->start->moved && f->start->tolerance == f->options->adaptive.tolerance;
+}
+
 /* From the model given, unless it is off in so many places that the atoms are the better start: t
  * does not hold then. One that holds stays as it is. */
 static ovoid_status grow_start(ov_adaptive *f, double tolerance, ov_trial *t) {
     ovoid_status status = OVOID_OK;
     ov_spots spots = {0};
-    const ov_growing how = {.stage = "grow", .most = f->atoms, .rounds = ov_tuned.grow_rounds};
+    ov_growing how = {.stage = "grow", .most = f->atoms, .rounds = ov_tuned.grow_rounds};
+    how.patience = is_frame(f) ? ov_tuned.motion_patience : 0;
     OV_TRY(ov_adaptive_take_start(f, t));
     OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
     if (f->options->adaptive.steps == 0 || ov_trial_holds(t, tolerance))
@@ -76,6 +82,25 @@ static ovoid_status take_atoms(ov_adaptive *f, ov_trial *t) {
     return status != OVOID_OK ? status : ov_adaptive_judge(f, t);
 }
 
+/* The model of the last frame was shrunk as far as it goes: only where growing ended with more
+ * ellipsoids than frames can do with, and some, they are made fewer. */
+static ovoid_status shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
+    const uint32_t effort = f->options->adaptive.effort;
+    const bool frame = is_frame(f);
+    const double slack = 1.0 + ov_tuned.motion_slack;
+    const ov_shrinking how = {
+        .least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
+        .idle_rounds = effort * (frame ? ov_tuned.motion_idle_rounds : ov_tuned.shrink_idle_rounds),
+        .idle_tries = effort * (frame ? ov_tuned.motion_idle_tries : ov_tuned.shrink_idle_tries)};
+    const ovoid_status status = ov_adaptive_shrink(f, tolerance, &how, best);
+    f->fewest = best->count;
+    if (frame) { /* if that many are there still, it takes so many */
+        const size_t needed = (size_t)((double)best->count / slack);
+        f->fewest = f->start->fewest > needed ? f->start->fewest : needed;
+    }
+    return status;
+}
+
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     if (f->start)
@@ -90,7 +115,7 @@ ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *b
         OV_TRY(take_atoms(f, best));
     if (ov_trial_holds(best, tolerance)) {
         f->held = best;
-        OV_TRY(ov_adaptive_shrink(f, tolerance, best));
+        OV_TRY(shrink(f, tolerance, best));
     }
     ov_adaptive_quadrics(f, best);
     OV_TRY(ov_owner_tidy(f->context, f->xyzr, f->atoms, f->quadrics, best->count,

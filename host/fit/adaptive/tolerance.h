@@ -13,6 +13,7 @@ typedef struct ov_growing {
     const char *stage;
     size_t most; /* ellipsoids */
     uint32_t rounds;
+    uint32_t patience; /* a place is only refined, with more weight, when it is met so many times */
 } ov_growing;
 
 /* Whether the tolerance was seen to hold when the trial was judged last. */
@@ -31,7 +32,15 @@ ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots);
 ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing *how, ov_trial *t,
                               ov_spots *spots);
 
+/* When shrinking ends: at so many ellipsoids, or when so many rounds and tries in a row gained next
+ * to nothing together. */
+typedef struct ov_shrinking {
+    size_t least;
+    uint32_t idle_rounds, idle_tries;
+} ov_shrinking;
+
 /* Merges ellipsoids of the best model, which holds, as long as it holds. */
-ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, ov_trial *best);
+ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, const ov_shrinking *how,
+                                ov_trial *best);
 
 #endif

@@ -19,6 +19,7 @@ from ._model import Model, read_model
 from ._molecule import Assembly, Molecule, read
 from ._objects import from_arrays, molecule
 from ._picture import Image
+from ._scene import Scene
 from ._trajectory import FitTrajectory, SurfaceTrajectory, fit_trajectory, measure_trajectory
 from .errors import (
     ArgumentError,
@@ -72,6 +73,7 @@ __all__ = [
     "OvoidWarning",
     "Pair",
     "Progress",
+    "Scene",
     "SurfaceTrajectory",
     "devices",
     "fit_trajectory",

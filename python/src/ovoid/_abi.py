@@ -76,6 +76,11 @@ DeviceInfo = _structure(
     ("fp64", c_bool),
     ("global_memory", c_uint64),
     ("max_allocation", c_uint64),
+    ("local_memory", c_uint64),
+    ("max_group", c_uint64),
+    ("pci", c_char * 16),
+    ("uuid", c_char * 40),
+    ("platform_version", c_char * 64),
 )
 ReadOptions = _structure(
     "ovoid_read_options",
@@ -224,6 +229,18 @@ ExportOptions = _structure(
     ("colour", c_double * 3),
     ("opacity", c_double),
     ("max_gigabytes", c_double),
+    ("range", c_double),
+    ("max_triangles", c_double),
+)
+Scene = _structure(
+    "ovoid_scene",
+    ("size", c_size_t),
+    ("molecule", c_void_p),
+    ("models", POINTER(c_void_p)),
+    ("model_count", c_size_t),
+    ("title", c_char_p),
+    ("decay", c_double),
+    ("isovalue", c_double),
 )
 PictureOptions = _structure(
     "ovoid_picture_options",
@@ -254,6 +271,7 @@ STRUCTURES = [
     *(AssemblyInfo, L1Options, AdaptiveOptions, FitOptions, L1Result, AdaptiveResult, FitResult),
     *(MeshOptions, Component, Distances, Pair, MeasureOptions, Measures, ExportOptions),
     PictureOptions,
+    Scene,
 ]
 
 # Arrays of these are mapped by numpy, with these sizes in bytes.
@@ -350,6 +368,8 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "mesh_write": (c_int, [_P, _P, c_char_p]),
     "mesh_distances": (c_int, [_P, _P, _P, c_bool, POINTER(Distances), POINTER(c_float)]),
     "measure": (c_int, [_P, _P, _P, POINTER(MeasureOptions), POINTER(Measures)]),
+    "scene_init": (None, [POINTER(Scene), c_size_t]),
+    "scene_export": (c_int, [_P, POINTER(Scene), c_char_p, POINTER(ExportOptions)]),
     "export_format_name": (c_char_p, [c_int]),
     "export_format_find": (c_int, [c_char_p]),
     "export_options_init": (None, [POINTER(ExportOptions), c_size_t]),

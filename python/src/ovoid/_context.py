@@ -49,6 +49,8 @@ class Device:
     compute_units, clock_mhz : int
     global_memory, max_allocation : int
         Bytes of all its memory, and of one buffer at most.
+    pci, uuid : str
+        Where it is on the PCI bus, and its own number; ``""`` where the driver does not tell.
     """
 
     index: int
@@ -62,6 +64,8 @@ class Device:
     clock_mhz: int
     global_memory: int
     max_allocation: int
+    pci: str
+    uuid: str
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,8 @@ def _device(info: Any) -> Device:
         clock_mhz=info.clock_mhz,
         global_memory=info.global_memory,
         max_allocation=info.max_allocation,
+        pci=text(info.pci),
+        uuid=text(info.uuid),
     )
 
 
@@ -191,8 +197,8 @@ class Context:
     Parameters
     ----------
     device : str, optional
-        An index (``"0"``), a type (``"cpu"``, ``"gpu"``, ``"accelerator"``) or a part of a
-        device's or platform's name. Default: the environment variable OVOID_DEVICE, else the first
+        An index (``"0"``), a type (``"cpu"``, ``"gpu"``, ``"accelerator"``), an address on the PCI
+        bus, a UUID, or a part of a device's or platform's name. Default: the environment variable OVOID_DEVICE, else the first
         GPU, else the first device. It is opened when first needed.
 
     Notes
@@ -351,7 +357,7 @@ class Context:
 
     def _discard(self, destroy: Any, address: int) -> None:
         self._graves.append((destroy, address))
-        if not self._running and self._lock.acquire(blocking=False):
+        if self._lock.acquire(blocking=False):
             try:
                 if not self._running:
                     self._bury()

@@ -200,19 +200,29 @@ class Field:
         progress : bool or callable
             See `Molecule.fit`.
         """
-        kind = 0
-        if format is not None:
-            kind = lib.export_format_find(format.encode())
-            if kind == 0:
-                raise ArgumentError(f"there is no format {format!r}")
-        options = _abi.filled(
-            _abi.ExportOptions,
-            format=kind,
+        options = export_options(
+            format,
             isovalue=isovalue,
             spacing=spacing,
-            colour=None if colour is None else (ctypes.c_double * 3)(*colour),
+            colour=colour,
             opacity=opacity,
             max_gigabytes=max_gigabytes,
         )
         with self.context._watching(progress):
             self.context._call(lib.field_export, self._pointer, encode(path), ctypes.byref(options))
+
+
+def export_options(
+    format: str | None,
+    *,
+    colour: tuple[float, float, float] | None = None,
+    **values: float | None,
+) -> Any:
+    """The library's structure; None leaves what is the default there."""
+    kind = 0
+    if format is not None:
+        kind = lib.export_format_find(format.encode())
+        if kind == 0:
+            raise ArgumentError(f"there is no format {format!r}")
+    vector = None if colour is None else (ctypes.c_double * 3)(*colour)
+    return _abi.filled(_abi.ExportOptions, format=kind, colour=vector, **values)

@@ -235,6 +235,7 @@ class Fitter:
         }
         self.context = context or default_context()
         self.atoms = len(molecule)
+        self.molecule: Molecule | None = molecule  # None where its atoms have moved
         options = options_of(**self._surface)  # type: ignore[arg-type]
         made = ctypes.c_void_p()
         self.context._call(
@@ -293,7 +294,9 @@ class Fitter:
                 notes["distance"] = f"{report.distance:.6g}"
             if stopped:
                 notes["stopped"] = "by a time limit or the caller"
-            return Model._of(made.value, report=report, notes=notes)
+            fitted = Model._of(made.value, report=report, notes=notes)
+            fitted.molecule = self.molecule
+            return fitted
 
         with self.context._watching(progress, time_limit) as watch:
             try:
@@ -341,3 +344,4 @@ class Fitter:
         """
         places = doubles(xyz, (self.atoms, 3), "xyz", " (Å)")
         self.context._call(lib.fitter_move, self._handle.pointer, places.ctypes.data)
+        self.molecule = None

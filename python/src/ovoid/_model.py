@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import warnings
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,9 @@ from ._context import Context, Handle, ProgressLike, encode, host_context, is_mi
 from ._field import DECAY, ISOVALUE, SPACING, Field
 from ._measure import Measures, measure_fields
 from ._mesh import Mesh
+from ._scene import Scene
 from ._views import Doubles, doubles, view
-from .errors import ArgumentError, EmptyError, FileError, OvoidError, OvoidWarning
+from .errors import ArgumentError, EmptyError, FileError
 
 if TYPE_CHECKING:
     from ._fit import FitReport
@@ -74,9 +74,12 @@ class Model:
     ----------
     report : FitReport or None
         What is known of the fit that it comes from.
+    molecule : Molecule or None
+        What it was fitted to, as far as it is known.
     """
 
     report: FitReport | None
+    molecule: Molecule | None
 
     def __init__(
         self,
@@ -113,6 +116,7 @@ class Model:
         assert made.value
         self._handle = Handle(made.value, lib.model_destroy)
         self.report = None
+        self.molecule = None
 
     @classmethod
     def _of(
@@ -121,6 +125,7 @@ class Model:
         model = cls.__new__(cls)
         model._handle = Handle(address, lib.model_destroy)
         model.report = report
+        model.molecule = None
         if report is not None:
             model._annotate("program", f"ovoid {lib.version().decode()} (Python)")
         for key, value in (notes or {}).items():
@@ -393,13 +398,10 @@ class Model:
         """Writes a file for ChimeraX, PyMOL and others, or a map; see `Field.export`."""
         self.field().export(path, **options)
 
-    def _repr_png_(self) -> bytes | None:
-        """What a notebook shows."""
-        try:
-            return self.render(view="ellipsoids", size=(800, 600))._repr_png_()
-        except OvoidError as error:  # a notebook shows the repr then
-            warnings.warn(f"no picture: {error}", OvoidWarning, stacklevel=2)
-            return None
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        """What a notebook shows: a `Scene` with the molecule that it was fitted to."""
+        shown = Scene(self.molecule, self)._repr_mimebundle_()
+        return {**shown, "text/plain": repr(self)}
 
 
 def _restore(

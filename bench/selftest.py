@@ -63,6 +63,8 @@ CHANGES = [
      "list[so_far.x] = (uint4)(brick_of[k], so_far.y, so_far.z, before + (at == 0 ? so_far.y : so_far.y / 2));"),
     ("march_place", "march.cl", "const float along = t[k] * spacing;",
      "const float along = 1.001f * t[k] * spacing;"),
+    ("list_reached", "gather.cl", "if (start[k + 1] > start[k])\n            list[to++] = k;",
+     "if (start[k + 1] > start[k])\n            list[to++] = k + 1;"),
     ("tree_leaves", "tree.cl", "box < leaves ? leaf[6 * box + k]", "box < leaves ? leaf[6 * box + k % 5]"),
     ("tree_level", "tree.cl", "for (uint i = 0; i < OV_GROUP && box < boxes; ++i) {",
      "for (uint i = 1; i < OV_GROUP && box < boxes; ++i) {"),

@@ -6,6 +6,7 @@
 
 #include <dlfcn.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -259,6 +260,17 @@ char *__wrap_strdup(const char *text) {
 void __wrap_free(void *memory) {
     faults.allocations -= memory != NULL;
     __real_free(memory);
+}
+
+/* Its buffer, which the C library makes by itself, is freed here. */
+FILE *__real_open_memstream(char **text, size_t *length);
+FILE *__wrap_open_memstream(char **text, size_t *length);
+FILE *__wrap_open_memstream(char **text, size_t *length) {
+    if (fails(FAULT_MEMORY, "open_memstream"))
+        return NULL;
+    FILE *const stream = __real_open_memstream(text, length);
+    faults.allocations += stream != NULL;
+    return stream;
 }
 
 /* For faults_new.cpp. */

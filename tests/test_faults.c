@@ -25,6 +25,7 @@ static struct {
     ovoid_molecule *molecule;
     ovoid_model *model;
     char molecule_file[512], structure_file[512], map_file[512], mesh_file[512];
+    char page_file[512], print_file[512], ihm_file[512];
 } input;
 
 /* What a piece of work gives. */
@@ -146,6 +147,33 @@ static ovoid_status write_map(ovoid_context *context, outcome *o) {
     return once_model_export(context, input.model, input.map_file, &options);
 }
 
+static ovoid_status write_scene(ovoid_context *context, const char *path) {
+    ovoid_export_options options;
+    ovoid_scene scene;
+    ovoid_export_options_init(&options, sizeof options);
+    ovoid_scene_init(&scene, sizeof scene);
+    options.spacing = 2.0;
+    scene.molecule = input.molecule;
+    scene.models = (const ovoid_model *const *)&input.model;
+    scene.model_count = 1;
+    return ovoid_scene_export(context, &scene, path, &options);
+}
+
+static ovoid_status write_page(ovoid_context *context, outcome *o) {
+    (void)o;
+    return write_scene(context, input.page_file);
+}
+
+static ovoid_status write_print(ovoid_context *context, outcome *o) {
+    (void)o;
+    return write_scene(context, input.print_file);
+}
+
+static ovoid_status write_ihm(ovoid_context *context, outcome *o) {
+    (void)o;
+    return write_scene(context, input.ihm_file);
+}
+
 /* Times of kernels are those of the day: only who was launched is compared. */
 static ovoid_status take_times(ovoid_context *context, outcome *o) {
     ovoid_status status = ovoid_context_profile(context, true);
@@ -163,6 +191,9 @@ static const work works[] = {
     {"field, with times", take_times, NULL, false},
     {"map", write_map, input.map_file, false},
     {"mesh file", write_mesh, input.mesh_file, false},
+    {"page", write_page, input.page_file, false},
+    {"print", write_print, input.print_file, false},
+    {"IHMCIF", write_ihm, input.ihm_file, true},
     {"measure", measure, NULL, false},
     {"picture", take_picture, NULL, false},
     {"difference", take_difference, NULL, false},
@@ -440,6 +471,9 @@ static void write_inputs(void) {
     snprintf(input.structure_file, 512, "%s", scratch_path(input.place, "small.cif"));
     snprintf(input.map_file, 512, "%s", scratch_path(input.place, "small.mrc"));
     snprintf(input.mesh_file, 512, "%s", scratch_path(input.place, "small.ply"));
+    snprintf(input.page_file, 512, "%s", scratch_path(input.place, "small.html"));
+    snprintf(input.print_file, 512, "%s", scratch_path(input.place, "small.3mf"));
+    snprintf(input.ihm_file, 512, "%s", scratch_path(input.place, "model.cif"));
     scratch_write(input.molecule_file, text, strlen(text));
     scratch_write(input.structure_file, cif, strlen(cif));
 }

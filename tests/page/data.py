@@ -20,22 +20,29 @@ def check_surface(page, level, detail, ply):
     for row, at, normal in zip(rows, xyz, normals):
         assert max(abs(a - b) for a, b in zip(row, at)) < 0.51 * s["step"] + 1e-5, (row, at)
         assert sum(a * b for a, b in zip(row[3:], normal)) > 0.99999, (row[3:], normal)
-    return xyz
+    return xyz, normals
 
 
 def nearest(point, others):
-    return math.sqrt(min(sum((a - b) ** 2 for a, b in zip(point, other)) for other in others))
+    """The way to the nearest of the others."""
+    return min(([b - a for a, b in zip(point, other)] for other in others),
+               key=lambda way: sum(x * x for x in way))
 
 
 def check_difference(page, molecule, model):
-    """At a vertex: about the distance to the other surface, and the sign says which is outside."""
+    """At a vertex: about the distance to the other surface, and the sign says which is outside: the
+    model's is where the way from the molecule's goes along the normal."""
     step = page.scene["range"] / 127
-    for of, mine, other in (("molecule", molecule, model), ("model", model, molecule)):
+    for of, (mine, normals), other, along in (("molecule", molecule, model[0], 1),
+                                              ("model", model, molecule[0], -1)):
         d, values = page.difference(of, 0, 0)
         assert len(values) == len(mine)
         signs = set()
         for i in range(0, len(mine), 37):
-            far = nearest(mine[i], other) # of vertices, half an angstrom apart
+            way = nearest(mine[i], other) # to a vertex, which are half an angstrom apart
+            far = math.hypot(*way)
+            if abs(values[i]) > 0.4:
+                assert along * sum(a * b for a, b in zip(way, normals[i])) * values[i] > 0, (of, i)
             if abs(values[i]) < page.scene["range"]:
                 assert abs(values[i]) < far + step, (values[i], far)
                 assert far < math.hypot(abs(values[i]), 0.5) + step, (values[i], far)

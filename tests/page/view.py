@@ -92,8 +92,8 @@ def check_turning(b, first):
     assert differing(first, b.screenshot()) == 0, "R brings it back"
 
 
-def middle(picture):
-    """A point of what is drawn: of its points, the one nearest to the middle of the page."""
+def drawn(picture):
+    """Points of what is drawn, with some of it about them, from the middle of the page outward."""
     width, height, data = picture
     paper = data[3 * (5 * width + 240):][:3]
 
@@ -101,9 +101,9 @@ def middle(picture):
         at = 3 * (y * width + x)
         return sum(abs(a - b) for a, b in zip(data[at:at + 3], paper)) > 60
 
-    return min(((x, y) for y in range(70, 230) for x in range(60, width - 60)
+    return sorted(((x, y) for y in range(70, 230) for x in range(60, width - 60)
                 if all(is_drawn(x + dx, y + dy) for dx in (-4, 0, 4) for dy in (-4, 0, 4))),
-               key=lambda p: (p[0] - width / 2) ** 2 + (p[1] - 160) ** 2)
+                  key=lambda p: (p[0] - width / 2) ** 2 + (p[1] - 160) ** 2)
 
 
 def card(b):
@@ -118,7 +118,8 @@ def check_picking(b, page):
     b.settle()
     assert card(b) == ""
     plain = b.screenshot()
-    x, y = middle(plain)
+    points = drawn(plain)
+    x, y = points[0]
     b.mouse("mouseMoved", x, y)
     b.settle()
     text, pointed = card(b), b.screenshot()
@@ -132,6 +133,17 @@ def check_picking(b, page):
     assert 0.002 < differing(plain, pointed) < 0.5, "it is marked, and it alone"
     yellow = share(pointed, lambda r, g, b: r > b + 80 and g > b + 50)
     assert yellow > 0.001
+    clear = [p for p in points if p[0] > 240] # beside the card
+    for far in range(1, 9): # what is pointed at is what is seen there
+        other = clear[far * (len(clear) - 1) // 8]
+        b.mouse("mouseMoved", *other)
+        b.settle()
+        seen, at = b.screenshot(), 3 * (other[1] * plain[0] + other[0])
+        if card(b): # at the rim, a pixel can be half covered
+            red, _, blue = seen[2][at:at + 3]
+            assert red > blue + 40, (other, seen[2][at:at + 3])
+        else:
+            assert seen[2][at:at + 3] == plain[2][at:at + 3]
     b.click(x, y)
     b.mouse("mouseMoved", 3, 180)
     assert card(b) == text, "a click keeps it"

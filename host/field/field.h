@@ -166,6 +166,8 @@ typedef struct ov_lists {
     /* Scratch, kept for the next time (kernels/lists.cl). */
     ov_buffer tally, totals, chain, next, entry_group, entry_bits, place, group_term, group_bits;
     ov_kernel packs_of_terms, scan_lists, hand_out_entries, lists_of_packs;
+    size_t room_chunks, room_entries, room_items; /* what there is room for: as asked for, so that
+                                                     what is launched does not go with buffers */
     ov_later later; /* the read of what they come to, between begin and end */
     cl_uint told[5];
 } ov_lists;

@@ -42,6 +42,15 @@ cleanup:
     return status;
 }
 
+/* Room for a quarter more than is wanted, unless no buffer holds that, or what there is. */
+static size_t roomy(const ovoid_context *context, size_t room, size_t wanted) {
+    const size_t more = wanted + wanted / 4;
+    const uint64_t limit = context->device->info.max_allocation;
+    if (wanted <= room)
+        return room;
+    return more > UINT32_MAX || (limit > 0 && more > limit / sizeof(cl_uint)) ? wanted : more;
+}
+
 static ovoid_status reserve_chunks(ovoid_context *context, ov_lists *lists, size_t chunks) {
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_buffer_reserve(context, &lists->next, chunks * sizeof(cl_uint), "chunks of lists"));
@@ -49,18 +58,9 @@ static ovoid_status reserve_chunks(ovoid_context *context, ov_lists *lists, size
                              "chunks of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->entry_bits, chunks * OV_CHUNK * sizeof(cl_ushort),
                              "chunks of lists"));
+    lists->room_chunks = chunks;
 cleanup:
     return status;
-}
-
-/* Chunks that there is room for. */
-static size_t chunks_held(const ov_lists *lists) {
-    size_t chunks = lists->next.bytes / sizeof(cl_uint);
-    const size_t groups = lists->entry_group.bytes / (OV_CHUNK * sizeof(cl_uint));
-    const size_t bits = lists->entry_bits.bytes / (OV_CHUNK * sizeof(cl_ushort));
-    chunks = groups < chunks ? groups : chunks;
-    chunks = bits < chunks ? bits : chunks;
-    return chunks < UINT32_MAX ? chunks : UINT32_MAX;
 }
 
 /* What a walk comes to: chunks taken, entries, pairs as low and high half, and whether all lists
@@ -116,7 +116,7 @@ static ovoid_status count(ovoid_context *context, ov_lists *lists, const ov_poin
                           const ov_terms *terms, double skin, const plan *p,
                           cl_uint totals[TOTALS]) {
     ovoid_status status = OVOID_OK;
-    const cl_uint4 room = {{(cl_uint)chunks_held(lists), UINT32_MAX, UINT32_MAX, 0}};
+    const cl_uint4 room = {{(cl_uint)lists->room_chunks, UINT32_MAX, UINT32_MAX, 0}};
     OV_TRY(walk(context, lists, points, terms, skin, p, room));
     OV_TRY(ov_buffer_read(context, &lists->totals, 0, totals, TOTALS * sizeof *totals));
 cleanup:
@@ -148,7 +148,7 @@ static ovoid_status find_entries(ovoid_context *context, ov_lists *lists, const 
     ovoid_status status = OVOID_OK;
     OV_TRY(reserve_starts(context, lists, p));
     OV_TRY(count(context, lists, points, terms, skin, p, totals));
-    if (totals[CHUNKS] > chunks_held(lists)) {
+    if (totals[CHUNKS] > lists->room_chunks) {
         OV_TRY(reserve_chunks(context, lists, totals[CHUNKS]));
         OV_TRY(count(context, lists, points, terms, skin, p, totals));
     }
@@ -164,19 +164,23 @@ cleanup:
 static ovoid_status reserve_items(ovoid_context *context, ov_lists *lists, const plan *p,
                                   size_t entries) {
     ovoid_status status = OVOID_OK;
-    const size_t size = sizeof(cl_uint);
+    const size_t size = sizeof(cl_uint), items = roomy(context, lists->room_items, lists->items);
+    entries = roomy(context, lists->room_entries, entries);
+    lists->room_items = lists->room_entries = 0; /* until all buffers are there */
     if (!lists->packs_only)
-        OV_TRY(ov_buffer_reserve(context, &lists->term_item, lists->items * size,
-                                 "packs of ellipsoids"));
-    if (lists->terms_only)
+        OV_TRY(ov_buffer_reserve(context, &lists->term_item, items * size, "packs of ellipsoids"));
+    if (lists->terms_only) {
+        lists->room_items = items;
         return OVOID_OK;
+    }
     OV_TRY(ov_buffer_reserve(context, &lists->group_term, entries * size, "groups of packs"));
     OV_TRY(ov_buffer_reserve(context, &lists->group_bits, entries * sizeof(cl_ushort),
                              "groups of packs"));
     OV_TRY(ov_buffer_reserve(context, &lists->pack_start, (p->packs + (size_t)1) * size,
                              "starts of lists"));
-    OV_TRY(
-        ov_buffer_reserve(context, &lists->pack_item, lists->items * size, "ellipsoids of packs"));
+    OV_TRY(ov_buffer_reserve(context, &lists->pack_item, items * size, "ellipsoids of packs"));
+    lists->room_items = items;
+    lists->room_entries = entries;
 cleanup:
     return status;
 }
@@ -230,18 +234,9 @@ bool ov_lists_built(const ov_lists *lists) {
 
 /* Entries and pairs that there is room for. */
 static cl_uint4 rooms_of(const ov_lists *lists) {
-    size_t entries = UINT32_MAX, items = UINT32_MAX;
-    if (!lists->terms_only) {
-        const size_t bits = lists->group_bits.bytes / sizeof(cl_ushort);
-        entries = lists->group_term.bytes / sizeof(cl_uint);
-        entries = bits < entries ? bits : entries;
-        items = lists->pack_item.bytes / sizeof(cl_uint);
-    }
-    if (!lists->packs_only && lists->term_item.bytes / sizeof(cl_uint) < items)
-        items = lists->term_item.bytes / sizeof(cl_uint);
-    entries = entries < UINT32_MAX ? entries : UINT32_MAX;
-    items = items < UINT32_MAX ? items : UINT32_MAX;
-    return (cl_uint4){{(cl_uint)chunks_held(lists), (cl_uint)entries, (cl_uint)items, 0}};
+    const size_t entries = lists->terms_only ? UINT32_MAX : lists->room_entries;
+    return (cl_uint4){
+        {(cl_uint)lists->room_chunks, (cl_uint)entries, (cl_uint)lists->room_items, 0}};
 }
 
 ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_points *points,

@@ -545,8 +545,7 @@ static ovoid_status reserve_light(ovoid_context *context, marcher *m, cl_uint *v
     ovoid_status status = OVOID_OK;
     const size_t offset = 3 * sizeof(cl_float), corner = 3 * sizeof(cl_uint);
     const size_t more = m->vertices + m->new_vertices, most = m->triangles + m->new_triangles;
-    if (m->vertices > 0 && (more * offset > m->placed.bytes || most * corner > m->corners.bytes ||
-                            (!m->bare && more * offset > m->placed_normals.bytes)))
+    if (m->vertices > 0 && (more > m->placed_vertices || most > m->corners_triangles))
         m->resident = false;
     *vertices = m->resident ? (cl_uint)m->vertices : 0;
     *triangles = m->resident ? (cl_uint)m->triangles : 0;

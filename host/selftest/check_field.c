@@ -173,13 +173,34 @@ static void expect_pairs(ov_checking *c, const ov_setting *s, const pairs *p, do
     }
 }
 
+/* The packs whose lists hold something, in order. */
+static ovoid_status check_reached(ov_checking *c, const ov_lists *lists, const uint32_t *start) {
+    ov_buffer list = {0};
+    ov_packs found = {0};
+    size_t wanted = 0;
+    const ovoid_status status = ov_packs_reached(c->context, lists, &list, &found);
+    for (uint32_t pack = 0; status == OVOID_OK && pack < lists->packs; ++pack) {
+        if (start[pack] == start[pack + 1])
+            continue;
+        ov_expect(c, wanted < found.count && found.pack[wanted] == pack,
+                  "list_reached: pack %u is not the one at %zu", (unsigned)pack, wanted);
+        ++wanted;
+    }
+    if (status == OVOID_OK)
+        ov_expect(c, found.count == wanted, "list_reached: %zu packs, not %zu", found.count,
+                  wanted);
+    ov_packs_destroy(&found);
+    ov_buffer_destroy(&list);
+    return status;
+}
+
 ovoid_status ov_check_lists(ov_checking *c) {
     ovoid_status status = OVOID_OK;
     const double cutoff = 1e-3;
     ov_setting s = {0};
     pairs p = {0};
     OV_TRY(ov_setting_create(c->context, 1, ov_check_size(c, 2000, 70),
-                             ov_check_size(c, 20011, 611), 12.0, 12.0, cutoff, &s));
+                             ov_check_size(c, 20011, 611), 12.0, 18.0, cutoff, &s));
     const ov_lists *const l = &s.lists;
     OV_TRY(ov_read_words(c->context, &l->term_start, l->terms + 1, &p.term_start));
     OV_TRY(ov_read_words(c->context, &l->term_item, l->items, &p.term_item));
@@ -188,6 +209,7 @@ ovoid_status ov_check_lists(ov_checking *c) {
     if (is_list(c, p.term_start, p.term_item, l->terms, l->items, l->packs, "term") &&
         is_list(c, p.pack_start, p.pack_item, l->packs, l->items, l->terms, "pack"))
         expect_pairs(c, &s, &p, cutoff, ov_check_size(c, 20, 1));
+    OV_TRY(check_reached(c, l, p.pack_start));
 cleanup:
     free(p.term_start);
     free(p.term_item);

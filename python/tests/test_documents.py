@@ -4,9 +4,8 @@ import re
 import shutil
 from pathlib import Path
 
-import pytest
-
 import ovoid
+import pytest
 
 pytestmark = pytest.mark.usefixtures("device")
 

@@ -221,6 +221,12 @@ def test_a_page_in_a_notebook(peptide, model, tmp_path):
     assert base64.b64decode(shown["image/png"]).startswith(b"\x89PNG")
     ovoid.Scene(None, model, title="Ä").export(tmp_path / "m.html")
     assert "Ä" in (tmp_path / "m.html").read_text("utf-8")
+    sizes = []
+    for colouring in ("plain", "residue"):
+        path = tmp_path / f"{colouring}.ply"
+        ovoid.Scene(peptide, model).export(path, colouring=colouring, spacing=1.0)
+        sizes.append(path.stat().st_size)
+    assert sizes[0] < sizes[1]
     with pytest.raises(ovoid.ArgumentError, match="molecule or a model"):
         ovoid.Scene(None)
 

@@ -121,7 +121,7 @@ static ovoid_status act(ov_adaptive *f, const char *stage, ov_trial *t, const ov
                         growth *g) {
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_adaptive_emphasise(f, spots));
-    OV_TRY(ov_places_meet(f->context, &g->places, spots, ov_tuned.spots_same, g->before));
+    OV_TRY(ov_places_meet(f->context, &g->places, spots, ov_tuned.spots_apart, g->before));
     OV_TRY(rebuild(f, t, spots, g));
     OV_TRY(split(f, t, spots, g));
     OV_TRY(choose(f, t, spots, 0, UINT32_MAX, ov_tuned.grow_refined, g));

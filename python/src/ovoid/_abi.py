@@ -231,6 +231,7 @@ ExportOptions = _structure(
     ("max_gigabytes", c_double),
     ("range", c_double),
     ("max_triangles", c_double),
+    ("colouring", c_int),
 )
 Scene = _structure(
     "ovoid_scene",

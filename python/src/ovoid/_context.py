@@ -198,8 +198,8 @@ class Context:
     ----------
     device : str, optional
         An index (``"0"``), a type (``"cpu"``, ``"gpu"``, ``"accelerator"``), an address on the PCI
-        bus, a UUID, or a part of a device's or platform's name. Default: the environment variable OVOID_DEVICE, else the first
-        GPU, else the first device. It is opened when first needed.
+        bus, a UUID, or a part of a device's or platform's name. Default: the environment variable
+        OVOID_DEVICE, else the first GPU, else the first device. It is opened when first needed.
 
     Notes
     -----

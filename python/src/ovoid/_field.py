@@ -184,7 +184,8 @@ class Field:
         ----------
         path : path-like
             Its extension is the format: of a model .bild, .cxc (ChimeraX), .py (PyMOL), .gmm,
-            .json; of models and molecules maps, .mrc, .map, .ccp4 and .dx.
+            .json, .xyz (OVITO), .lmp (LAMMPS), .pdb (ANISOU), .gltf (splats); of models and
+            molecules maps, .mrc, .map, .ccp4 and .dx. `Scene.export` has more.
         format : str, optional
             The name of the format, where the extension does not tell.
         isovalue : float, optional

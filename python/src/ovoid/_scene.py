@@ -15,11 +15,15 @@ from . import _abi
 from ._abi import lib
 from ._context import Context, ProgressLike, default_context, encode
 from ._field import export_options
+from ._fit import choice
 from .errors import ArgumentError, OvoidError, OvoidWarning
 
 if TYPE_CHECKING:
     from ._model import Model
     from ._molecule import Molecule
+
+
+COLOURINGS = ("plain", "difference", "chain", "residue", "ellipsoid")
 
 
 class Scene:
@@ -73,6 +77,7 @@ class Scene:
         max_gigabytes: float | None = None,
         range: float | None = None,
         max_triangles: float | None = None,
+        colouring: str | None = None,
         progress: ProgressLike = False,
     ) -> None:
         """Writes a file, whole or not at all.
@@ -80,14 +85,19 @@ class Scene:
         Parameters
         ----------
         path : path-like
-            .html is a page, one file that needs no network; the other extensions are those of
-            `Field.export`, for the first model.
+            Its extension is the format: .html is a page, one file that needs no network; .ply,
+            .glb and .3mf are surfaces with colours, .vert (and .face) those of MSMS with the
+            nearest atoms, .cif is IHMCIF; .xyz (OVITO), .lmp (LAMMPS), .pdb (ANISOU), .gltf
+            (splats) and the extensions of `Field.export` take the first model.
         format, isovalue, spacing, colour, opacity, max_gigabytes
             As there.
         range : float, optional
             Of the difference's colours, to either side (Å).
         max_triangles : float, optional
             Of a surface in a page.
+        colouring : {"plain", "difference", "chain", "residue", "ellipsoid"}, optional
+            Of the surface in a .ply, .glb or .3mf file. Default: the difference where there are a
+            molecule and a model.
         progress : bool or callable
             See `Molecule.fit`.
         """
@@ -101,6 +111,8 @@ class Scene:
             range=range,
             max_triangles=max_triangles,
         )
+        if colouring is not None:
+            options.colouring = choice(colouring, COLOURINGS, "colouring") + 1
         pointers = (ctypes.c_void_p * len(self.models))(*(m._pointer.value for m in self.models))
         scene = _abi.filled(
             _abi.Scene,

@@ -260,20 +260,6 @@ static const char *source(const char *name) {
     return "";
 }
 
-static void put_html(const char *text, FILE *stream) {
-    for (; *text; text++)
-        switch (*text) {
-        case '&':
-            fputs("&amp;", stream);
-            break;
-        case '<':
-            fputs("&lt;", stream);
-            break;
-        default:
-            putc((unsigned char)*text < 0x20 ? ' ' : *text, stream);
-        }
-}
-
 /* page.html has a line @NAME@ where each of the parts goes. */
 ovoid_status ov_write_page(ovoid_context *context, const ov_scene *scene,
                            const ovoid_export_options *options, const char *title, FILE *stream) {
@@ -287,7 +273,7 @@ ovoid_status ov_write_page(ovoid_context *context, const ov_scene *scene,
         mark = at + strcspn(at, "@");
         fwrite(at, 1, (size_t)(mark - at), stream);
         if (strncmp(mark, "@TITLE@", 7) == 0)
-            put_html(title, stream);
+            ov_markup_text(title, stream);
         else if (strncmp(mark, "@STYLE@", 7) == 0)
             fputs(source("page.css"), stream);
         else if (strncmp(mark, "@SCRIPT@", 8) == 0)

@@ -86,6 +86,24 @@ void ov_json_text(const char *string, FILE *stream) {
     }
 }
 
+void ov_markup_text(const char *string, FILE *stream) {
+    const unsigned char *text = (const unsigned char *)string;
+    while (*text) {
+        const size_t length = ov_utf8_length(text);
+        if (length == 0)
+            fputs("\xef\xbf\xbd", stream); /* U+FFFD */
+        else if (*text < 0x20)
+            putc(' ', stream);
+        else if (*text == '&')
+            fputs("&amp;", stream);
+        else if (*text == '<')
+            fputs("&lt;", stream);
+        else
+            fwrite(text, 1, length, stream);
+        text += length ? length : 1;
+    }
+}
+
 void ov_json_string(const char *string, FILE *stream) {
     putc('"', stream);
     ov_json_text(string, stream);

@@ -39,4 +39,7 @@ void ov_title(const char *path, char *title, size_t size);
 void ov_json_string(const char *string, FILE *stream);
 void ov_json_text(const char *string, FILE *stream);
 
+/* Text between the tags of XML or HTML, made UTF-8 likewise; control characters become spaces. */
+void ov_markup_text(const char *string, FILE *stream);
+
 #endif

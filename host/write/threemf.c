@@ -3,6 +3,7 @@
  * colours that triangles refer to by their corners. 1 angstrom is 1 millimetre; the item is moved
  * to where coordinates are positive, as printers want it. */
 #include "write/paint.h"
+#include "write/text.h"
 
 #include "base/progress.h"
 #include "write/bytes.h"
@@ -114,20 +115,6 @@ static const char relations[] =
     "<Relationship Target=\"/3D/3dmodel.model\" Id=\"rel0\" "
     "Type=\"http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel\"/></Relationships>\n";
 
-static void put_xml(const char *text, FILE *stream) {
-    for (; *text; text++)
-        switch (*text) {
-        case '&':
-            fputs("&amp;", stream);
-            break;
-        case '<':
-            fputs("&lt;", stream);
-            break;
-        default:
-            putc((unsigned char)*text < 0x20 ? ' ' : *text, stream);
-        }
-}
-
 static int by_colour(const void *a, const void *b) {
     const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
@@ -211,7 +198,7 @@ static ovoid_status put_model(ovoid_context *context, const ov_painted *p, const
           "xmlns:m=\"http://schemas.microsoft.com/3dmanufacturing/material/2015/02\">\n"
           "<metadata name=\"Title\">",
           xml);
-    put_xml(title, xml);
+    ov_markup_text(title, xml);
     fprintf(xml,
             "</metadata><metadata name=\"Application\">Ovoid %s</metadata>"
             "<metadata name=\"Description\">1 millimetre is 1 angstrom</metadata>\n<resources>",

@@ -266,6 +266,35 @@ cleanup:
     return status;
 }
 
+/* Those of the list have terms, and nobody else. */
+static ovoid_status check_reached(ov_checking *c, const uint32_t *list, size_t count,
+                                  size_t packs) {
+    ovoid_status status = OVOID_OK;
+    ov_lists lists = {.packs = packs};
+    ov_buffer there = {0};
+    ov_packs found = {0};
+    uint32_t *const start = ov_alloc(c->context, packs + 1, sizeof *start, "starts of lists");
+    if (!start)
+        return OVOID_ERROR_MEMORY;
+    for (size_t k = 0, n = 0; k < packs; ++k) {
+        const bool reached = n < count && list[n] == k;
+        start[k + 1] = start[k] + (reached ? 1 + (uint32_t)(k % 5) : 0);
+        n += reached;
+    }
+    OV_TRY(ov_buffer_put(c->context, &lists.pack_start, start, (packs + 1) * sizeof *start,
+                         "starts of lists"));
+    OV_TRY(ov_packs_reached(c->context, &lists, &there, &found));
+    ov_expect_near(c, (double)found.count, (double)count, 0.0, "list_reached: number", 0);
+    for (size_t n = 0; n < count && n < found.count; ++n)
+        ov_expect_near(c, found.pack[n], list[n], 0.0, "list_reached: pack", n);
+cleanup:
+    free(start);
+    ov_packs_destroy(&found);
+    ov_buffer_destroy(&there);
+    ov_lists_destroy(&lists);
+    return status;
+}
+
 ovoid_status ov_check_gather(ov_checking *c) {
     ovoid_status status = OVOID_OK;
     ov_setting s = {0};
@@ -280,6 +309,7 @@ ovoid_status ov_check_gather(ov_checking *c) {
     const size_t count = some_packs(s.points.packs, list);
     OV_TRY(check_points(c, &s, list, count, &numbers));
     OV_TRY(check_targets(c, &s, list, count, &numbers));
+    OV_TRY(check_reached(c, list, count, s.points.packs));
 cleanup:
     free(list);
     ov_buffer_destroy(&numbers);

@@ -63,8 +63,6 @@ CHANGES = [
     ("march_number", "march.cl", "before + so_far.y);", "before + so_far.y + (so_far.x == 1 ? 1 : 0));"),
     ("march_place", "march.cl", "const float along = t[k] * spacing;",
      "const float along = 1.001f * t[k] * spacing;"),
-    ("list_reached", "gather.cl", "if (start[k + 1] > start[k])\n            list[to++] = k;",
-     "if (start[k + 1] > start[k])\n            list[to++] = k + 1;"),
     ("tree_leaves", "tree.cl", "box < leaves ? leaf[6 * box + k]", "box < leaves ? leaf[6 * box + k % 5]"),
     ("tree_level", "tree.cl", "for (uint i = 0; i < OV_GROUP && box < boxes; ++i) {",
      "for (uint i = 1; i < OV_GROUP && box < boxes; ++i) {"),

@@ -104,11 +104,12 @@ __kernel void march_signs(const uint bricks, const uint run, const float isovalu
     const int16 bit = (int16)(1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 4, 1 << 5, 1 << 6, 1 << 7,
                               1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15);
     for (uint k = first; k < end; ++k) {
-        const int16 lane = (vload16(k, value) > isovalue) & bit;
-        const int8 eight = lane.lo | lane.hi;
-        const int4 four = eight.lo | eight.hi;
-        const int2 two = four.lo | four.hi;
-        sign[brick_of[k]] = (uint)(two.x | two.y);
+        int lane[16];
+        uint mask = 0;
+        vstore16((vload16(k, value) > isovalue) & bit, 0, lane);
+        for (uint j = 0; j < 16; ++j)
+            mask |= (uint)lane[j];
+        sign[brick_of[k]] = mask;
     }
 }
 

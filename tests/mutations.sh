@@ -29,19 +29,19 @@ host/device/open.c|gram@64|waves of 64 are not filled|s/wave_of(device) >= WAVE 
 host/device/launch.c|device|groups are not fitted to the kernel|s/if (local > kernel->max_group)/if (false)/
 host/device/launch.c|device|any group for a kernel compiled for one|s/if (kernel->group \&\& local != kernel->group)/if (false)/
 host/device/launch.c|device|a write under way is not copied|/memcpy(copy, data, bytes);/d
-host/device/launch.c|faults|a read that failed counts as done|s/return code == CL_SUCCESS ? idle(context)$/return true ? idle(context)/
+host/device/launch.c|faults|a read that failed counts as done|s/return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);/return OVOID_OK;/
 host/device/launch.c|faults|a write that failed counts as done|/bytes, copy ? copy : data, 0, NULL, NULL);/,/return ov_cl_fail/{/if (code/d;/return ov_cl_fail/d}
 host/device/program.c|faults|a kernel is lost where its limits are not told|s/^    clReleaseKernel(kernel->handle);$//
 host/device/error.c|faults|out of memory is any error|s/return code == CL_OUT_OF_HOST_MEMORY .*/return code == CL_SUCCESS/
 host/device/devices.c|faults|a device is what it did not say|s/return find_defect(entry);/find_defect(entry); return CL_SUCCESS;/
 host/molecule/sites.c|faults|out of memory is a bad selection|s/return \*error ? ov_fail/return true ? ov_fail/
 host/field/lists.c|l1_objective|lists cover a third of the skin|s|(skin + (double)points->rounding)|(skin / 3.0 + (double)points->rounding)|
-host/fit/adaptive/solver.c|solver|the tolerance of conjugate gradients|s/tolerance \* tolerance \* start/1e4 * tolerance * start/
+host/fit/adaptive/solver.c|solver|the tolerance of conjugate gradients|s/(cl_float)(tolerance \* tolerance)/(cl_float)(1e4 * tolerance)/
 host/fit/adaptive/refine.c|refine|no bound of axes|s/^    ov_factor_bound_decay(to, least);//
 host/fit/adaptive/adaptive.c|+adaptive|calibration in the wrong direction|s/(1.0 - volume_ratio) \/ per_log/(volume_ratio - 1.0) \/ per_log/
 host/fit/adaptive/local.c|local|points are not found anew|s/m->escaped =$/m->escaped = false \&\&/
 host/fit/adaptive/merge.c|merge|a split forgets the variance|s/half.decay\[2\] \/= shrink;//
-host/measure/judge.c|judge|spots are not thinned|s/near = square < apart \* apart;/near = false;/
+host/measure/judge.c|judge|spots are not thinned|s/if (square < apart \* apart)/if (false)/
 host/mesh/mesh.c|mesh|walls of cavities are outer|s/mesh->component\[c\].outer = mesh->component\[c\].volume > 0.0;/mesh->component[c].outer = true;/
 host/mixture/reduce.c|reduce|partners that are used up are not looked for again|s/if (list->next == list->count \&\& list->more)/if (false)/
 host/molecule/pqr.c|molecule|a PDB file is not suspected|s/return !pdb->cleared \&\& atoms > 1/return false \&\& atoms > 1/

@@ -101,10 +101,9 @@ moments(const uint count, __global const uint *restrict idle, __global const flo
         __global const ov_term *restrict terms, __global float *restrict result) {
     const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
     const uint lane = sharer % OV_LANES;
-    if (idle && *idle != 0)
-        return;
+    const bool done = idle && *idle != 0;
 #if OV_SHARERS == 1
-    if (index >= count)
+    if (index >= count || done)
         return;
 #endif
     /* otherwise a group is exactly one term, and all of it takes part in the barriers */
@@ -114,7 +113,7 @@ moments(const uint count, __global const uint *restrict idle, __global const flo
     for (uint m = 0; m < OV_MONOMIALS; ++m)
         total[m] = rest[m] = sum[m] = 0.0f;
 
-    const uint end = start[index + 1];
+    const uint end = done ? start[index] : start[index + 1];
     uint tiles = 0;
     for (uint first = start[index]; first < end; first += OV_TILE_PACKS) {
         const uint packs = min((uint)OV_TILE_PACKS, end - first);
@@ -177,7 +176,7 @@ moments(const uint count, __global const uint *restrict idle, __global const flo
         ov_sum_both(total[m], rest[m], &high, &low);
 #if OV_SHARERS > 1
         ov_add_team(&high, &low, sharer, scratch);
-        if (sharer == 0)
+        if (sharer == 0 && !done)
 #endif
         {
             result[((size_t)index * OV_MONOMIALS + m) * 2] = high;

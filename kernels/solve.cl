@@ -13,8 +13,9 @@
  * ellipsoids are few, one group does all of an iteration but the product with J^T W J.
  *
  * The device itself stops the iteration: state has a word that is not 0 once there is nothing more
- * to be done, which makes the kernels of all iterations that follow return at once, and counts the
- * iterations. What the residual has to fall to is `limit`, `share` of its start.
+ * to be done, which leaves the kernels of all iterations that follow nothing to do, and counts the
+ * iterations. They meet their barriers all the same: PoCL spoils memory where a small group returns
+ * before one. What the residual has to fall to is `limit`, `share` of its start.
  */
 
 #define PARAMETERS 10
@@ -299,10 +300,9 @@ solve_product(const uint count, const float lambda, __global const uint *restric
               __global float *restrict q, __global float *restrict pq) {
     __local float scratch[OV_SOLVE_GROUP];
     const uint index = get_global_id(0);
-    if (state[0] != 0)
-        return;
-    const float sum =
-        index < count ? multiply_one(index, lambda, factor, moments, diagonal, p, q) : 0.0f;
+    float sum = 0.0f;
+    if (index < count && state[0] == 0)
+        sum = multiply_one(index, lambda, factor, moments, diagonal, p, q);
     leave_sum(sum, scratch, pq);
 }
 
@@ -317,12 +317,12 @@ SOLVE_KERNEL void solve_update(const uint count, const uint groups,
     __local float scratch[OV_SOLVE_GROUP];
     __local float alpha;
     const uint index = get_global_id(0);
-    if (state[0] != 0)
-        return;
+    float sum = 0.0f;
     if (get_local_id(0) == 0)
         alpha = step_length(take_sum(rz, groups), take_sum(pq, groups));
     barrier(CLK_LOCAL_MEM_FENCE);
-    const float sum = index < count ? advance_one(index, alpha, block, p, q, x, r, z) : 0.0f;
+    if (index < count && state[0] == 0)
+        sum = advance_one(index, alpha, block, p, q, x, r, z);
     leave_sum(sum, scratch, rz_next);
 }
 
@@ -393,21 +393,17 @@ __kernel void solve_step(const uint count, const float lambda, const uint groups
     float sum = 0.0f;
     if (get_group_id(0) > 0)
         return;
-    if (state[0] != 0) {
-        if (at == 0)
-            next_state(state, before, before, share, limit, state_next);
-        return;
-    }
-    for (uint index = at; index < count; index += size)
+    const uint end = state[0] == 0 ? count : 0;
+    for (uint index = at; index < end; index += size)
         sum += multiply_one(index, lambda, factor, moments, diagonal, p, q);
     const float curvature = sum_of_group(sum, scratch);
     const float alpha = step_length(before, curvature);
     sum = 0.0f;
-    for (uint index = at; index < count; index += size)
+    for (uint index = at; index < end; index += size)
         sum += advance_one(index, alpha, block, p, q, x, r, z);
     const float after = sum_of_group(sum, scratch);
     const float beta = before > 0.0f ? after / before : 0.0f;
-    for (uint index = at; index < count; index += size)
+    for (uint index = at; index < end; index += size)
         turn_one(index, beta, factor, z, p, polynomial);
     if (at == 0) {
         rz_next[0] = after;

@@ -2,7 +2,7 @@
  * Ellipsoids along the curve: the same ones, neighbours beside each other, with the atoms that they
  * had.
  */
-#include "fit/adaptive/parts.h"
+#include "fit/adaptive/search.h"
 #include "support.h"
 
 enum { P = OV_FACTOR_PARAMETERS, ATOMS = 900, COUNT = 300 };

@@ -1,4 +1,4 @@
-#include "fit/adaptive/parts.h"
+#include "fit/adaptive/search.h"
 
 #include "fit/adaptive/constants.h"
 #include <math.h>

@@ -1,4 +1,4 @@
-#include "fit/adaptive/parts.h"
+#include "fit/adaptive/search.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 #ifndef OV_ADAPTIVE_TOLERANCE_H
 #define OV_ADAPTIVE_TOLERANCE_H
 
-#include "fit/adaptive/parts.h"
+#include "fit/adaptive/search.h"
 #include "fit/adaptive/places.h"
 
 /* How long growing may go on. */

@@ -3,8 +3,8 @@
  * the steps they are made of. Progress is reported on the way; OVOID_ERROR_CANCELLED when the
  * caller has had enough.
  */
-#ifndef OV_ADAPTIVE_PARTS_H
-#define OV_ADAPTIVE_PARTS_H
+#ifndef OV_ADAPTIVE_SEARCH_H
+#define OV_ADAPTIVE_SEARCH_H
 
 #include "fit/adaptive/adaptive.h"
 

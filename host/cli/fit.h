@@ -80,8 +80,9 @@ const char *fit_first_step_name(ovoid_first_step first_step);
 /* The numbers of ovoid_fit_options that options set. Those of the goals are in the order of
  * ovoid_goal, so that fit_goal_numbers[goal] has its name and value. */
 extern const cli_number fit_surface_numbers[], fit_goal_numbers[], fit_adaptive_numbers[],
-    fit_l1_numbers[];
-extern const size_t fit_surface_count, fit_goal_count, fit_adaptive_count, fit_l1_count;
+    fit_parts_numbers[], fit_l1_numbers[];
+extern const size_t fit_surface_count, fit_goal_count, fit_adaptive_count, fit_parts_count,
+    fit_l1_count;
 
 /* And of other structures: two of fit_job, and ovoid_measure_options.spacing. */
 extern const cli_number fit_levels_number, fit_time_limit_number, fit_mesh_spacing_number;

@@ -93,6 +93,8 @@ static void print_adaptive(const ovoid_fit_options *defaults, FILE *stream) {
         OVOID_DEFAULT_TOLERANCE, (int)CLI_GOAL);
     cli_number_help(&fit_levels_number, &job, stream);
     print_numbers(fit_adaptive_numbers, fit_adaptive_count, defaults, stream);
+    fputs("\nMethod adaptive, large molecules:\n", stream);
+    print_numbers(fit_parts_numbers, fit_parts_count, NULL, stream);
     cli_option_help(
         "--checkpoint FILE",
         "keep each part in FILE as soon as it is done, until the model is written; with "

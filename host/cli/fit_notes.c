@@ -39,8 +39,11 @@ static void print_settings(const fit_job *job, char *text, size_t size) {
             append_numbers(&fit_goal_numbers[options->adaptive.goal], 1, options, text, size, used);
         used = append_numbers(fit_adaptive_numbers, fit_adaptive_count, options, text, size, used);
         if (used < size)
-            snprintf(text + used, size - used, ", mesh-spacing %.9g",
-                     options->adaptive.mesh_spacing);
+            used += (size_t)snprintf(text + used, size - used, ", mesh-spacing %.9g",
+                                     options->adaptive.mesh_spacing);
+        if (used < size && job->levels[0].result.parts > 1) /* the model depends on them alone */
+            snprintf(text + used, size - used, ", parts %llu",
+                     (unsigned long long)job->levels[0].result.parts);
         return;
     }
     used = append_numbers(fit_l1_numbers, fit_l1_count, options, text, size, used);

@@ -40,6 +40,10 @@ const cli_number fit_adaptive_numbers[] = {
     COUNT("steps", adaptive.steps, 0, UINT32_MAX,
           "steps of each refinement (Levenberg-Marquardt) at most; 0 leaves the merged Gaussians "
           "as they are"),
+};
+const size_t fit_adaptive_count = sizeof fit_adaptive_numbers / sizeof *fit_adaptive_numbers;
+
+const cli_number fit_parts_numbers[] = {
     COUNT("part-atoms", parts.atoms, 0, UINT32_MAX,
           "fits the molecule in parts of at most so many atoms, from 64, so that memory follows a "
           "part and not the molecule; 0: in parts of 16384 where there are more than 65536"),
@@ -47,7 +51,7 @@ const cli_number fit_adaptive_numbers[] = {
           "so many parts side by side, each with a thread of its own: the model stays the same; 0: "
           "one"),
 };
-const size_t fit_adaptive_count = sizeof fit_adaptive_numbers / sizeof *fit_adaptive_numbers;
+const size_t fit_parts_count = sizeof fit_parts_numbers / sizeof *fit_parts_numbers;
 
 const cli_number fit_l1_numbers[] = {
     COUNT("iterations", l1.iterations, 1, UINT32_MAX, "iterations at most: MaxNiter"),
@@ -162,11 +166,13 @@ enum {
     SURFACE_COUNT = sizeof fit_surface_numbers / sizeof *fit_surface_numbers,
     GOAL_COUNT = sizeof fit_goal_numbers / sizeof *fit_goal_numbers,
     ADAPTIVE_COUNT = sizeof fit_adaptive_numbers / sizeof *fit_adaptive_numbers,
+    PARTS_COUNT = sizeof fit_parts_numbers / sizeof *fit_parts_numbers,
     L1_COUNT = sizeof fit_l1_numbers / sizeof *fit_l1_numbers,
     /* The first of each group. */
     GOALS = NUMBERS + SURFACE_COUNT,
     ADAPTIVES = GOALS + GOAL_COUNT,
-    L1S = ADAPTIVES + ADAPTIVE_COUNT,
+    PARTS = ADAPTIVES + ADAPTIVE_COUNT,
+    L1S = PARTS + PARTS_COUNT,
     NUMBERS_END = L1S + L1_COUNT,
     NUMBER_COUNT = NUMBERS_END - NUMBERS
 };
@@ -183,6 +189,8 @@ typedef struct parser {
 static const cli_number *number_of(int option) {
     if (option >= L1S)
         return &fit_l1_numbers[option - L1S];
+    if (option >= PARTS)
+        return &fit_parts_numbers[option - PARTS];
     if (option >= ADAPTIVES)
         return &fit_adaptive_numbers[option - ADAPTIVES];
     if (option >= GOALS)

@@ -88,6 +88,11 @@ static void append_count(char *text, size_t width, uint64_t number, const char *
  * it has gone on. */
 static void compose_endless(const ovoid_progress *progress, char *text, size_t width) {
     char part[96];
+    if (progress->total != OVOID_UNKNOWN && progress->total > 1) { /* of a molecule in parts */
+        snprintf(part, sizeof part, "%llu/%llu parts", (unsigned long long)progress->done,
+                 (unsigned long long)progress->total);
+        append(text, width, part);
+    }
     if (progress->iteration > 0) {
         snprintf(part, sizeof part, "step %llu", (unsigned long long)progress->iteration);
         append(text, width, part);

@@ -102,6 +102,8 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
     b->good = b->good && cJSON_AddBoolToObject(b->object, "stopped", level->stopped);
     if (!l1)
         add_number(b, "solver_iterations", (double)result->adaptive.solver_iterations);
+    if (!l1)
+        add_number(b, "parts", (double)result->parts);
     if (level->measured)
         b->good = b->good && measures_report(b->object, &level->measures, &job->measuring);
 }

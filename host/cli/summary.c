@@ -33,9 +33,13 @@ static void print_work(FILE *out, const fit_job *job) {
                 options->l1.kernel == OVOID_KERNEL_SPHERE ? ", spheres at the atoms" : "");
     else
         fprintf(out,
-                "fit       %llu step%s of refinement, %llu of conjugate gradients, method %s\n",
+                "fit       %llu step%s of refinement, %llu of conjugate gradients, method %s",
                 (count)result->iterations, plural(result->iterations),
                 (count)result->adaptive.solver_iterations, method);
+    if (options->method == OVOID_METHOD_ADAPTIVE && result->parts > 1)
+        fprintf(out, ", %llu parts", (count)result->parts);
+    if (options->method == OVOID_METHOD_ADAPTIVE)
+        putc('\n', out);
 }
 
 static void print_stop(FILE *out, const fit_job *job) {

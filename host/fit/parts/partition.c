@@ -3,6 +3,7 @@
 #include "base/progress.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 
 /* ---- cutting --------------------------------------------------------------------------------- */
@@ -53,26 +54,24 @@ static void sort_three(const double *xyzr, size_t axis, uint32_t *a, uint32_t *b
 /* Puts the atoms that come first along the axis before order[half]: Hoare's selection. */
 static void select_half(const double *xyzr, size_t axis, uint32_t *order, size_t count,
                         size_t half) {
-    size_t low = 0, high = count - 1;
+    ptrdiff_t low = 0, high = (ptrdiff_t)count - 1;
+    const ptrdiff_t wanted = (ptrdiff_t)half;
     while (low < high) {
-        const size_t middle = low + (high - low) / 2;
+        const ptrdiff_t middle = low + (high - low) / 2;
+        ptrdiff_t i = low, j = high;
         sort_three(xyzr, axis, &order[low], &order[middle], &order[high]);
         const uint32_t pivot = order[middle];
-        size_t i = low, j = high;
         while (i <= j) {
             while (is_before(xyzr, axis, order[i], pivot))
                 ++i;
             while (is_before(xyzr, axis, pivot, order[j]))
                 --j;
-            if (i > j)
-                break;
-            swap(&order[i++], &order[j]);
-            if (j-- == 0)
-                break;
+            if (i <= j)
+                swap(&order[i++], &order[j--]);
         }
-        if (half <= j)
+        if (wanted <= j)
             high = j;
-        else if (half >= i)
+        else if (wanted >= i)
             low = i;
         else
             return;

@@ -115,6 +115,7 @@ enum {
     TRACE,
     OWNERS,
     OUT_DIR,
+    MODELS,
     QUIET,
     KERNEL,
     FIRST_STEP,
@@ -135,6 +136,7 @@ static const struct option named[] = {
     {"trace", required_argument, NULL, TRACE},
     {"owners", required_argument, NULL, OWNERS},
     {"out-dir", required_argument, NULL, OUT_DIR},
+    {"models", required_argument, NULL, MODELS},
     {"quiet", no_argument, NULL, QUIET},
     READING_OPTIONS,
     {"kernel", required_argument, NULL, KERNEL},
@@ -317,6 +319,8 @@ static bool complete(int argc, char **argv, const parser *p) {
     job->input = argv[optind];
     job->inputs = argv + optind;
     job->input_count = (size_t)(argc - optind);
+    if (job->all_models)
+        return fit_models_check(job);
     if (job->input_count > 1 && !job->folder)
         job->folder = ".";
     return job->folder ? fit_batch_check(job) : fit_outputs_name(job) && fit_outputs_check(job);
@@ -355,6 +359,11 @@ static bool parse_named(parser *p, int option) {
     case OUT_DIR:
         job->folder = optarg;
         return true;
+    case MODELS:
+        job->all_models = strcmp(optarg, "all") == 0;
+        if (!job->all_models)
+            cli_error("--models takes all, not '%s'; --model N fits one of them", optarg);
+        return job->all_models;
     case 'q':
     case QUIET:
         job->quiet = true;

@@ -3,6 +3,7 @@
 import base64
 import gc
 import html
+import inspect
 import os
 import pathlib
 import pickle
@@ -210,6 +211,49 @@ def test_pictures(peptide, model, tmp_path):
     assert image.pixels.shape == (120, 160, 4) and image.range > 0
     assert len(np.unique(image.pixels.reshape(-1, 4), axis=0)) > 100
     assert image._repr_png_().startswith(b"\x89PNG")
+
+
+def test_pictures_of_two_are_the_same_from_either(peptide, model):
+    how = {"view": "difference", "size": (80, 60), "samples": 1}
+    pictures = [model.render(peptide, **how), peptide.render(model, **how)]
+    assert np.array_equal(pictures[0].pixels, pictures[1].pixels)
+    alone = peptide.render(size=(80, 60), samples=1).pixels
+    assert not np.array_equal(alone, model.render(size=(80, 60), samples=1).pixels)
+    with pytest.raises(ovoid.ArgumentError, match="a Molecule and a Model, not a Model and a Model"):
+        model.render(model)
+    with pytest.raises(ovoid.ArgumentError, match="its own decay"):
+        model.render(peptide, decay=0.4)
+
+
+def test_surfaces_are_meshed_alike(peptide, model):
+    for thing in (peptide, model):
+        same = [thing.mesh(1.0), thing.field().mesh(1.0), ovoid.Field(thing).field().mesh(1.0)]
+        for mesh in same[1:]:
+            assert np.array_equal(same[0].vertices, mesh.vertices)
+        assert thing.mesh(1.0, isovalue=2.0).area < same[0].area
+    with pytest.raises(ovoid.ArgumentError, match="a model has its own decay"):
+        model.mesh(decay=0.4)
+    with pytest.raises(ovoid.ArgumentError, match="a field has its own decay"):
+        model.field().mesh(decay=0.4)
+    with pytest.raises(ovoid.ArgumentError, match="the context that it was made with"):
+        model.field().mesh(context=ovoid.Context())
+
+
+def test_options_of_fits_have_names(peptide):
+    shown = inspect.signature(ovoid.Molecule.fit).parameters
+    assert shown["method"].default == "adaptive" and shown["decay"].default is None
+    assert set(inspect.signature(ovoid.Fitter).parameters) | {"progress"} < set(shown) | {"molecule"}
+    text = ovoid.Molecule.fit.__doc__
+    for name in shown.keys() - {"self"}:
+        assert re.search(rf"^        [\w, ]*\b{name}\b[\w, ]* : ", text, re.M), name
+    for function, wrong in (
+        (peptide.fit, "spacng"),
+        (ovoid.Fitter(peptide).fit, "decay"),
+        (lambda **options: ovoid.Fitter(peptide, **options), "effort"),
+        (lambda **options: ovoid.fit_trajectory([peptide.xyz], peptide, **options), "steps"),
+    ):
+        with pytest.raises(TypeError, match=f"unexpected keyword argument '{wrong}'"):
+            function(**{wrong: 1})
 
 
 def test_a_page_in_a_notebook(peptide, model, tmp_path):

@@ -13,11 +13,14 @@ import numpy.typing as npt
 
 from . import _abi
 from ._abi import UNKNOWN, lib
-from ._context import Context, Handle, ProgressLike, _outside, default_context
+from ._context import Context, Handle, _outside, default_context
+from ._options import SearchOptions, SurfaceOptions, spelled_out
 from ._views import doubles
 from .errors import ArgumentError, Cancelled, GoalWarning, Interrupted
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from ._model import Model
     from ._molecule import Molecule
 
@@ -124,23 +127,17 @@ def options_of(
     ratio: float | None = None,
     *,
     method: str = "adaptive",
-    decay: float | None = None,
-    isovalue: float | None = None,
-    spacing: float | None = None,
-    padding: float | None = None,
     effort: int | None = None,
     steps: int | None = None,
-    mesh_spacing: float | None = None,
     l1: Mapping[str, Any] | None = None,
+    mesh_spacing: float | None = None,
+    **points: float | None,
 ) -> Any:
     """The library's structure; None leaves what is the default there."""
     options = _abi.filled(
         _abi.FitOptions,
         method=choice(method, METHODS, "method"),
-        decay=decay,
-        isovalue=isovalue,
-        spacing=spacing,
-        padding=padding,
+        **points,
     )
     goal = any(value is not None for value in (tolerance, ellipsoids, ratio))
     if method == "l1" and goal:
@@ -215,28 +212,19 @@ class Fitter:
     >>> next = fitter.fit(tolerance=0.5)                      # doctest: +SKIP
     """
 
+    @spelled_out(SurfaceOptions)
     def __init__(
         self,
         molecule: Molecule,
         *,
-        decay: float | None = None,
-        isovalue: float | None = None,
-        spacing: float | None = None,
-        padding: float | None = None,
-        mesh_spacing: float | None = None,
         context: Context | None = None,
+        **surface: Unpack[SurfaceOptions],
     ) -> None:
-        self._surface = {
-            "decay": decay,
-            "isovalue": isovalue,
-            "spacing": spacing,
-            "padding": padding,
-            "mesh_spacing": mesh_spacing,
-        }
+        self._surface = surface
         self.context = context or default_context()
         self.atoms = len(molecule)
         self.molecule: Molecule | None = molecule  # None where its atoms have moved
-        options = options_of(**self._surface)  # type: ignore[arg-type]
+        options = options_of(**self._surface)
         made = ctypes.c_void_p()
         self.context._call(
             lib.fitter_create, molecule._pointer, ctypes.byref(options), ctypes.byref(made)
@@ -247,18 +235,13 @@ class Fitter:
     def __repr__(self) -> str:
         return f"<ovoid.Fitter of {self.atoms} atoms>"
 
+    @spelled_out(SearchOptions)
     def fit(
         self,
         tolerance: float | None = None,
         ellipsoids: int | None = None,
         ratio: float | None = None,
-        *,
-        method: str = "adaptive",
-        effort: int | None = None,
-        steps: int | None = None,
-        l1: Mapping[str, Any] | None = None,
-        time_limit: float | None = None,
-        progress: ProgressLike = False,
+        **search: Unpack[SearchOptions],
     ) -> Model:
         """Fits a model to the surface. The parameters are those of `Molecule.fit`.
 
@@ -268,14 +251,10 @@ class Fitter:
         """
         from ._model import Model
 
-        options = options_of(
-            *(tolerance, ellipsoids, ratio),
-            method=method,
-            effort=effort,
-            steps=steps,
-            l1=l1,
-            **self._surface,  # type: ignore[arg-type]
-        )
+        wanted: dict[str, Any] = {**search, **self._surface}
+        time_limit = wanted.pop("time_limit", None)
+        progress = wanted.pop("progress", False)
+        options = options_of(tolerance, ellipsoids, ratio, **wanted)
         if time_limit is not None and not time_limit > 0:
             raise ArgumentError(f"time_limit is {time_limit}, and must be above 0 s")
         result = _abi.filled(_abi.FitResult)

@@ -4,6 +4,7 @@ import base64
 import gc
 import html
 import inspect
+import json
 import os
 import pathlib
 import pickle
@@ -285,3 +286,35 @@ def test_fitter(peptide):
         [10, 0, 0], abs=0.2
     )
     assert np.array_equal(moved.owner, fine.owner)
+
+
+def test_selftest(monkeypatch):
+    """As the tool has it; what is wrong is told, and no error."""
+    told = []
+    found = ovoid.selftest(brief=True, progress=told.append)
+    command = [os.environ.get("OVOID_TOOL", "ovoid"), "selftest", "--short", "--json"]
+    tool = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    assert found.passed and told
+    assert [c.name for c in found.checks] == [c["name"] for c in tool["checks"]]
+    for check, theirs in zip(found.checks, tool["checks"]):
+        assert check.kernels == tuple(theirs["kernels"].split()) and check.text == ""
+        assert check.numbers == theirs["numbers"] and 0 <= check.error <= 1
+    assert found.device == ovoid.use_device(None) and found.round_trip_seconds > 0
+    assert len(str(found).splitlines()) == len(found.checks) + 2 and "0 wrong" in repr(found)
+
+    def wrong(handle, options, told, user, result):
+        for verdict in range(3):
+            raw = _abi.Check(name=b"lists", kernels=b"a b", verdict=verdict, text=b"off")
+            told(_abi.ctypes.addressof(raw), None)
+        return 0
+
+    monkeypatch.setattr(_abi.lib, "selftest", wrong)
+    found = ovoid.selftest()
+    assert [c.verdict for c in found.checks] == ["passed", "wrong", "failed"]
+    assert not found.passed and "1 wrong, 1 failed" in repr(found) and "    off" in str(found)
+
+
+def test_selftest_can_be_stopped():
+    with pytest.raises(ovoid.Cancelled):
+        ovoid.selftest(progress=lambda _: False)
+    assert ovoid.selftest(brief=True).passed

@@ -264,15 +264,36 @@ PictureOptions = _structure(
     ("range", c_double),
 )
 
+Check = _structure(
+    "ovoid_check",
+    ("size", c_size_t),
+    ("name", c_char_p),
+    ("kernels", c_char_p),
+    ("verdict", c_int),
+    ("seconds", c_double),
+    ("compared", c_uint64),
+    ("error", c_double),
+    ("text", c_char_p),
+)
+SelfTestOptions = _structure("ovoid_selftest_options", ("size", c_size_t), ("brief", c_bool))
+SelfTestResult = _structure(
+    "ovoid_selftest_result",
+    ("size", c_size_t),
+    *((name, c_uint32) for name in ("passed", "wrong", "failed")),
+    *((name, c_uint32) for name in ("vector", "lanes", "team", "solve_group")),
+    *((name, c_double) for name in ("launch_seconds", "round_trip_seconds")),
+    *((name, c_double) for name in ("to_device_bytes", "from_device_bytes")),
+)
+
 ProgressFunction = CFUNCTYPE(c_bool, c_void_p, c_void_p)
 WarningFunction = CFUNCTYPE(None, c_char_p, c_void_p)
+CheckFunction = CFUNCTYPE(None, c_void_p, c_void_p)
 
 STRUCTURES = [
     *(L1Progress, AdaptiveProgress, Progress, DeviceInfo, ReadOptions, MoleculeCounts),
     *(AssemblyInfo, L1Options, AdaptiveOptions, FitOptions, L1Result, AdaptiveResult, FitResult),
     *(MeshOptions, Component, Distances, Pair, MeasureOptions, Measures, ExportOptions),
-    PictureOptions,
-    Scene,
+    *(PictureOptions, Scene, Check, SelfTestOptions, SelfTestResult),
 ]
 
 # Arrays of these are mapped by numpy, with these sizes in bytes.
@@ -303,6 +324,12 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "devices": (c_int, [_P, c_size_t, POINTER(_P), _SIZE]),
     "context_open_device": (c_int, [_P, c_char_p]),
     "context_device": (POINTER(DeviceInfo), [_P]),
+    "selftest": (
+        c_int,
+        [_P, POINTER(SelfTestOptions), CheckFunction, _P, POINTER(SelfTestResult)],
+    ),
+    "selftest_options_init": (None, [POINTER(SelfTestOptions), c_size_t]),
+    "selftest_result_init": (None, [POINTER(SelfTestResult), c_size_t]),
     "free": (None, [_P]),
     "molecule_read_with": (c_int, [_P, c_char_p, POINTER(ReadOptions), POINTER(_P)]),
     "molecule_create": (c_int, [_P, _P, c_size_t, POINTER(_P)]),

@@ -5,9 +5,9 @@
 Fits each molecule in three levels (to the default tolerance, or with so many ellipsoids per atom), writes
 its page with each of some spacings and opens it at 1280 x 800 pixels. Time to first picture is from the
 navigation to the first frame that is on the canvas; frames per second are those of 60 turns in each view,
-each drawn and waited for (gl.finish), and no more than the 60 of a screen. Without a GPU Chromium draws by SwiftShader on the processor: the
-column "renderer" says so, and such frames are those of a machine without a GPU. It takes Debian's chromium.
-The record is results/page.csv, whole or not at all. Run it on a quiet machine.
+each drawn and waited for (gl.finish), and no more than the 60 of a screen. Without a GPU Chromium draws by
+SwiftShader on the processor: the column "renderer" says so, and such frames are those of a machine without a GPU. It takes
+Debian's chromium. The record is results/page.csv, whole or not at all. Run it on a quiet machine.
 """
 
 import argparse

@@ -73,9 +73,18 @@ void fit_session_remember(fit_job *job) {
         ovoid_fitter_destroy(&job->fitter); /* the next one begins with its atoms */
 }
 
+/* Parts are of atoms: a model that begins with another one is fitted as a whole, and would take
+ * more memory than parts are there to save. */
+static bool is_in_parts(const fit_job *job) {
+    return job->levels_done && job->options.method == OVOID_METHOD_ADAPTIVE &&
+           job->levels[0].result.parts > 1;
+}
+
 void fit_session_keep(fit_job *job) {
     fit_session *const session = job->session;
-    if (!job->fitter)
+    if (is_in_parts(job))
+        fit_session_destroy(session);
+    if (!job->fitter || is_in_parts(job))
         return;
     ovoid_fitter_destroy(&session->fitter);
     ovoid_molecule_destroy(&session->molecule);

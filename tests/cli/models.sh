@@ -2,14 +2,14 @@
 need_device
 goal="--ellipsoids 6"
 
-# make_models FILE NUMBER[+]...: a PDB file of a chain of 30 atoms, in each model a little longer; with a
+# make_models FILE NUMBER[+]...: a PDB file of a chain of $size atoms, in each model a little longer; with a
 # + an atom more, with a - five atoms alone.
 make_models() {
     file=$1
     shift
     for number; do
-        atoms=30
-        case $number in *+) atoms=31 ;; *-) atoms=5 ;; esac
+        atoms=$size
+        case $number in *+) atoms=$((size + 1)) ;; *-) atoms=5 ;; esac
         awk -v n=$atoms -v m="${number%[+-]}" 'BEGIN {
             printf "MODEL     %4d\n", m
             for (i = 0; i < n; i++)
@@ -18,6 +18,7 @@ make_models() {
             print "ENDMDL" }'
     done >"$file"
 }
+size=30
 make_models e.pdb 1 2 3 7
 run "$OVOID" fit e.pdb --model 1 $goal -o ../single.ovoid --report ../single.json
 expect_code 0
@@ -98,6 +99,20 @@ expect_silent
 grep -q '^# model: 3$' q.model3.ovoid || fail "model 3 should begin with its atoms"
 rm o.* q.*
 
+# In parts each begins with its atoms, as alone.
+size=150
+make_models w.pdb 1 2
+size=30
+run "$OVOID" fit w.pdb --models all --ratio 0.2 --part-atoms 64 --report r.jsonl -o w.ovoid --no-measure
+expect_code 0
+expect_silent
+[ "$(grep -c '"moved_from":null' r.jsonl)" -eq 2 ] || fail "both should begin with their atoms"
+run "$OVOID" fit w.pdb --model 2 --ratio 0.2 --part-atoms 64 -o alone.ovoid --no-measure -q
+expect_code 0
+grep -v '^#' alone.ovoid >../a
+grep -v '^#' w.model2.ovoid | cmp -s - ../a || fail "the second should be that of a single run"
+rm w.* alone.ovoid r.jsonl
+
 # One that fails does not stop the others.
 make_models few.pdb 1 2- 3
 run "$OVOID" fit few.pdb --models all $goal --report r.jsonl
@@ -126,6 +141,8 @@ refused 2 - --models all
 expect_err "standard input cannot be"
 refused 2 e.pdb --models all --model 2
 expect_err "leave one of the two out"
+refused 2 e.pdb --models all --checkpoint c
+expect_err "--checkpoint does not go with --models"
 for option in -o --owners --trace; do
     refused 2 e.pdb --models all $option -
     expect_err "standard output cannot take"

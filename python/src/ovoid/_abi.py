@@ -145,6 +145,11 @@ AdaptiveOptions = _structure(
     ("steps", c_uint32),
     ("mesh_spacing", c_double),
 )
+PartsOptions = _structure(
+    "ovoid_parts_options",
+    *((name, c_uint32) for name in ("atoms", "jobs", "resume")),
+    ("checkpoint", c_char_p),
+)
 FitOptions = _structure(
     "ovoid_fit_options",
     ("size", c_size_t),
@@ -155,6 +160,7 @@ FitOptions = _structure(
     ("padding", c_double),
     ("adaptive", AdaptiveOptions),
     ("l1", L1Options),
+    ("parts", PartsOptions),
 )
 L1Result = _structure(
     "ovoid_l1_result",
@@ -179,6 +185,7 @@ FitResult = _structure(
     ("l1", L1Result),
     ("adaptive", AdaptiveResult),
     ("counts", c_uint64 * COUNTS),
+    ("parts", c_uint64),
 )
 MeshOptions = _structure(
     "ovoid_mesh_options",
@@ -291,7 +298,8 @@ CheckFunction = CFUNCTYPE(None, c_void_p, c_void_p)
 
 STRUCTURES = [
     *(L1Progress, AdaptiveProgress, Progress, DeviceInfo, ReadOptions, MoleculeCounts),
-    *(AssemblyInfo, L1Options, AdaptiveOptions, FitOptions, L1Result, AdaptiveResult, FitResult),
+    *(AssemblyInfo, L1Options, AdaptiveOptions, PartsOptions, FitOptions),
+    *(L1Result, AdaptiveResult, FitResult),
     *(MeshOptions, Component, Distances, Pair, MeasureOptions, Measures, ExportOptions),
     *(PictureOptions, Scene, Check, SelfTestOptions, SelfTestResult),
 ]

@@ -61,6 +61,8 @@ class FitReport:
     spacing : float
         Of the constrained points (Å).
     points, iterations : int
+    parts : int
+        That the molecule was cut into; 1 as a whole.
     sample_seconds, fit_seconds : float
     rms_error, max_error : float
         Of method l1, of the field at the constrained points; else NaN.
@@ -77,6 +79,7 @@ class FitReport:
     spacing: float
     points: int
     iterations: int
+    parts: int
     sample_seconds: float
     fit_seconds: float
     rms_error: float
@@ -130,6 +133,8 @@ def options_of(
     effort: int | None = None,
     steps: int | None = None,
     l1: Mapping[str, Any] | None = None,
+    part_atoms: int | None = None,
+    jobs: int | None = None,
     mesh_spacing: float | None = None,
     **points: float | None,
 ) -> Any:
@@ -145,11 +150,16 @@ def options_of(
     if method != "l1" and l1:
         raise ArgumentError("l1 holds options of method='l1'")
     _goal(options, tolerance, ellipsoids, ratio)
-    for name, value in (("effort", effort), ("steps", steps)):
+    for kind, name, value in (
+        (options.adaptive, "effort", effort),
+        (options.adaptive, "steps", steps),
+        (options.parts, "atoms", part_atoms),
+        (options.parts, "jobs", jobs),
+    ):
         if value is not None:
             if not 0 <= value < 2**32:
                 raise ArgumentError(f"{name} is {value}")
-            setattr(options.adaptive, name, value)
+            setattr(kind, name, value)
     if mesh_spacing is not None:
         options.adaptive.mesh_spacing = mesh_spacing
     _set_l1(options.l1, l1 or {})
@@ -172,6 +182,7 @@ def _report(result: Any, atoms: int, stopped: bool) -> FitReport:
         spacing=result.spacing,
         points=count(result.points),
         iterations=count(result.iterations),
+        parts=count(result.parts) or 1,
         sample_seconds=result.sample_seconds,
         fit_seconds=result.fit_seconds,
         rms_error=result.l1.rms_error,
@@ -188,6 +199,8 @@ def settings_of(options: Any, report: FitReport) -> str:
         words.append(f"{goal} {getattr(options.adaptive, goal):.9g}")
         words += [f"effort {options.adaptive.effort}", f"steps {options.adaptive.steps}"]
         words.append(f"mesh-spacing {options.adaptive.mesh_spacing:.9g}")
+        if report.parts > 1:
+            words.append(f"parts {report.parts}")
     else:
         words += [f"iterations {options.l1.iterations}", f"kernel {KERNELS[options.l1.kernel]}"]
     return ", ".join(words)

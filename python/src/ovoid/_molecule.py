@@ -242,6 +242,11 @@ class Molecule(Pictured):
             1 (default) to 10: more starts and repairs, more time.
         steps : int, optional
             Of each refinement at most (default 60).
+        part_atoms : int, optional
+            Fits the molecule in parts of at most so many atoms, from 64, so that memory follows a
+            part; default: parts of 16384 where there are more than 65536 atoms.
+        jobs : int, optional
+            So many parts side by side; the model stays the same.
         l1 : mapping, optional
             Options of method l1 by their names in the C interface, such as ``{"iterations": 500}``.
         time_limit : float, optional

@@ -29,6 +29,8 @@ class SearchOptions(TypedDict, total=False):
     effort: int | None
     steps: int | None
     l1: Mapping[str, Any] | None
+    part_atoms: int | None
+    jobs: int | None
     time_limit: float | None
     progress: ProgressLike
 

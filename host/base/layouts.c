@@ -47,7 +47,6 @@ PROMISED(ovoid_distances, 5 * sizeof(double));
 PROMISED(ovoid_pair, 3 * sizeof(double));
 PROMISED(ovoid_l1_options, 80);
 PROMISED(ovoid_adaptive_options, 48);
-PROMISED(ovoid_parts_options, 16 + sizeof(const char *));
 PROMISED(ovoid_l1_progress, 7 * sizeof(double));
 PROMISED(ovoid_adaptive_progress, sizeof(double));
 PROMISED(ovoid_l1_result, 72);

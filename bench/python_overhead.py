@@ -4,9 +4,10 @@
     OVOID_LIBRARY=build/release/host/libovoid.so PYTHONPATH=python/src \\
         python3 bench/python_overhead.py build/release/ovoid MOLECULE... [--runs N]
 
-Prints seconds of both from start to end (the least of N runs, taken in turns), the difference, and the same
-of the processor's time, which a busy machine changes less; before that, what it takes to import numpy and
-ovoid. Both read, fit to the default tolerance, measure and write.
+It takes numpy alone (Debian: python3-numpy). Prints seconds of both from start to end (the least of N runs,
+taken in turns), the difference, and the same of the processor's time, which a busy machine changes less;
+before that, what it takes to import numpy and ovoid. Both read, fit to the default tolerance, measure and
+write. The record is results/python_overhead.csv, whole or not at all.
 """
 
 import argparse
@@ -16,12 +17,19 @@ import sys
 import tempfile
 import time
 
+HERE = os.path.dirname(os.path.abspath(__file__))
+COLUMNS = "molecule,tool,python,difference,percent,tool_cpu,python_cpu,difference_cpu"
 CODE = """
 import sys, ovoid
 molecule = ovoid.read(sys.argv[1])
 model = molecule.fit()
 model.measure(molecule)
 model.write(sys.argv[2])
+"""
+DEVICE = """
+import ovoid, platform
+device = ovoid.use_device(None)
+print(f"ovoid {ovoid.__version__}, Python {platform.python_version()}, {device.name}, driver {device.driver}")
 """
 
 
@@ -36,31 +44,44 @@ def seconds(command):
     return time.perf_counter() - begin, used.ru_utime + used.ru_stime
 
 
+def heading(given):
+    """What it was measured on, and what imports take."""
+    imports = {
+        name: min(seconds([sys.executable, "-c", code])[0] for _ in range(given.runs))
+        for name, code in (("none", ""), ("numpy", "import numpy"), ("ovoid", "import ovoid"))
+    }
+    device = subprocess.run([sys.executable, "-c", DEVICE], check=True, capture_output=True, text=True)
+    yield f"# bench/python_overhead.py: {device.stdout.strip()}; the least of {given.runs} runs, seconds"
+    yield (f"# import of numpy {imports['numpy'] - imports['none']:.3f} s, of ovoid beyond it "
+           f"{imports['ovoid'] - imports['numpy']:.3f} s, of Python itself {imports['none']:.3f} s")
+
+
+def row(given, molecule, out):
+    tool = [given.tool, "fit", molecule, "-o", out, "--quiet"]
+    python = [sys.executable, "-c", CODE, molecule, out]
+    seconds(tool), seconds(python)  # kernels are compiled
+    runs = [(*seconds(tool), *seconds(python)) for _ in range(given.runs)]
+    wall, cpu, our_wall, our_cpu = (min(column) for column in zip(*runs))
+    return (f"{os.path.basename(molecule)},{wall:.3f},{our_wall:.3f},{our_wall - wall:.3f},"
+            f"{100 * (our_wall - wall) / wall:.1f},{cpu:.3f},{our_cpu:.3f},{our_cpu - cpu:.3f}")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("tool")
     parser.add_argument("molecules", nargs="+")
     parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--out", default=os.path.join(HERE, "results", "python_overhead.csv"))
     given = parser.parse_args()
-    imports = {
-        name: min(seconds([sys.executable, "-c", code])[0] for _ in range(given.runs))
-        for name, code in (("none", ""), ("numpy", "import numpy"), ("ovoid", "import ovoid"))
-    }
-    print(f"import of numpy {imports['numpy'] - imports['none']:.3f} s, "
-          f"of ovoid beyond it {imports['ovoid'] - imports['numpy']:.3f} s, "
-          f"of Python itself {imports['none']:.3f} s")
-    print("molecule,tool,python,difference,percent,tool_cpu,python_cpu,difference_cpu")
+    lines = [*heading(given), COLUMNS]
+    print(*lines, sep="\n", flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        out = os.path.join(folder, "model.ovoid")
         for molecule in given.molecules:
-            tool = [given.tool, "fit", molecule, "-o", out, "--quiet"]
-            python = [sys.executable, "-c", CODE, molecule, out]
-            seconds(tool), seconds(python)  # kernels are compiled
-            runs = [(*seconds(tool), *seconds(python)) for _ in range(given.runs)]
-            wall, cpu, our_wall, our_cpu = (min(column) for column in zip(*runs))
-            print(f"{os.path.basename(molecule)},{wall:.3f},{our_wall:.3f},{our_wall - wall:.3f},"
-                  f"{100 * (our_wall - wall) / wall:.1f},{cpu:.3f},{our_cpu:.3f},"
-                  f"{our_cpu - cpu:.3f}", flush=True)
+            lines.append(row(given, molecule, os.path.join(folder, "model.ovoid")))
+            print(lines[-1], flush=True)
+    with open(given.out + ".part", "w", encoding="utf-8") as out:
+        out.write("\n".join(lines) + "\n")
+    os.replace(given.out + ".part", given.out)
 
 
 if __name__ == "__main__":

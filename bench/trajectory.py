@@ -2,15 +2,19 @@
 """Surfaces and fits along a trajectory: adenylate kinase of MDAnalysisTests (3,341 atoms, 98 frames), there
 and back until there are enough frames.
 
+    python3 -m venv VENV && VENV/bin/pip install MDAnalysis MDAnalysisTests mdtraj freesasa
     OVOID_LIBRARY=build/release/host/libovoid.so PYTHONPATH=python/src \\
-        python3 bench/trajectory.py [--frames 1000] [--fits 100] [--out bench/results/trajectory.csv]
+        VENV/bin/python bench/trajectory.py [--frames 1000] [--fits 100]
 
-It takes MDAnalysis, MDAnalysisTests and, for the comparison, freesasa (PyPI). Rows:
+in a folder outside the repository; freesasa and mdtraj are for the comparison alone and may be missing. Rows:
 - surface: seconds per frame for area and volume at spacings of 0.5 and 1 Å
-- freesasa: seconds per frame of Lee and Richards' and of Shrake and Rupley's area, on one core (its package
-  knows no threads), with the same radii: another surface, so the speed alone compares
+- freesasa: seconds per frame of Lee and Richards' area and of Shrake and Rupley's, with the same radii (its
+  package knows no threads); mdtraj: of Shrake and Rupley's, with as many points (100) and radii of its own.
+  These are other surfaces, of which there is no volume: the speed alone compares
 - warm and fresh: seconds per frame of fits that begin with the frame before, and of fits from the atoms,
   with ellipsoids and deviation, in tenths of the way, so that a drift would be seen
+"cores" is the processor's time over that of the clock: how many of them worked. The record is
+results/python_trajectory.csv, whole or not at all.
 """
 
 import argparse
@@ -34,13 +38,24 @@ def there_and_back(universe, frames):
     return places[[abs((k + last) % (2 * last) - last) if last else 0 for k in range(frames)]]
 
 
+class Clock:
+    """Seconds, and how many cores worked meanwhile."""
+
+    def __init__(self):
+        self.wall, self.cpu = time.perf_counter(), time.process_time()
+
+    def per(self, frames):
+        wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
+        return {"frames": frames, "seconds": wall / frames, "cores": cpu / wall}
+
+
 def surfaces(places, molecule):
     for spacing, vertices in ((0.5, "exact"), (1.0, "exact"), (1.0, "linear")):
         ovoid.measure_trajectory(places[:2], molecule, spacing=spacing, vertices=vertices)  # compile
+        clock = Clock()
         found = ovoid.measure_trajectory(places, molecule, spacing=spacing, vertices=vertices)
-        yield {"what": "surface", "how": f"{spacing} Å, {vertices}", "frames": len(places),
-               "seconds": found.seconds.mean(), "area": found.area.mean(),
-               "volume": found.volume.mean()}
+        yield {"what": "surface", "how": f"{spacing} Å, {vertices}", **clock.per(len(places)),
+               "area": found.area.mean(), "volume": found.volume.mean()}
 
 
 def freesasa_rows(places, molecule):
@@ -52,13 +67,28 @@ def freesasa_rows(places, molecule):
     radii = np.array(molecule.radii)
     for name in (freesasa.LeeRichards, freesasa.ShrakeRupley):
         options = freesasa.Parameters({"algorithm": name})
-        begin = time.perf_counter()
+        clock = Clock()
         areas = [freesasa.calcCoord(xyz.ravel(), radii, options).totalArea() for xyz in places]
-        yield {"what": "freesasa", "how": name, "frames": len(places),
-               "seconds": (time.perf_counter() - begin) / len(places), "area": np.mean(areas)}
+        yield {"what": "freesasa", "how": name, **clock.per(len(places)), "area": np.mean(areas)}
+
+
+def mdtraj_rows(places, files):
+    try:
+        import mdtraj
+    except ImportError:
+        print("skipped: no mdtraj", file=sys.stderr)
+        return
+    one = mdtraj.load_frame(files[1], 0, top=files[0])
+    frames = mdtraj.Trajectory(np.asarray(places / 10.0, np.float32), one.topology)  # nm
+    clock = Clock()
+    areas = mdtraj.shrake_rupley(frames, n_sphere_points=100)
+    yield {"what": "mdtraj", "how": "ShrakeRupley", **clock.per(len(places)),
+           "area": 100.0 * float(areas.sum(axis=1).mean())}
 
 
 def fits(places, molecule, every):
+    if len(places) == 0:
+        return
     found = ovoid.fit_trajectory(places, molecule, fresh_every=every, measure=False, keep_models=False)
     tenths = max(1, len(places) // 10)
     for begin in range(0, len(places), tenths):
@@ -82,7 +112,7 @@ def main():
     parser.add_argument("--frames", type=int, default=1000)
     parser.add_argument("--fits", type=int, default=100)
     parser.add_argument("--every", type=int, default=10, help="a fresh fit beside each N-th")
-    parser.add_argument("--out", default=os.path.join(HERE, "results", "trajectory.csv"))
+    parser.add_argument("--out", default=os.path.join(HERE, "results", "python_trajectory.csv"))
     given = parser.parse_args()
     warnings.simplefilter("ignore", DeprecationWarning)
     import MDAnalysis
@@ -92,7 +122,7 @@ def main():
     molecule = ovoid.molecule(universe)
     places = there_and_back(universe, max(given.frames, given.fits))
     device = ovoid.use_device(None)
-    names = ["what", "how", "frames", "seconds", "area", "volume", "ellipsoids", "deviation"]
+    names = ["what", "how", "frames", "seconds", "cores", "area", "volume", "ellipsoids", "deviation"]
     with open(given.out + ".part", "w", encoding="utf-8", newline="") as out:
         out.write(f"# bench/trajectory.py: adenylate kinase, {len(molecule)} atoms; ovoid "
                   f"{ovoid.__version__}, {device.name}, driver {device.driver}\n")
@@ -100,6 +130,7 @@ def main():
         table.writeheader()
         for rows in (surfaces(places[: given.frames], molecule),
                      freesasa_rows(places[: given.frames], molecule),
+                     mdtraj_rows(places[: given.frames], (PSF, DCD)),
                      fits(places[: given.fits], molecule, given.every)):
             for row in rows:
                 shown = {k: f"{v:.5g}" if isinstance(v, float) else v for k, v in row.items()}

@@ -1,4 +1,4 @@
-# The component 'python': what the Python package holds beside its sources (python/pyproject.toml).
+# The component 'python': what the Python package holds beside its sources (pyproject.toml).
 # A wheel has no symbolic links, so the library is one file, under the name that programs ask for.
 set_target_properties(ovoid PROPERTIES VERSION ${OVOID_ABI} SOVERSION ${OVOID_ABI})
 set_target_properties(ovoid_tool PROPERTIES INSTALL_RPATH "$ORIGIN/../lib")

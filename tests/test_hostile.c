@@ -333,6 +333,9 @@ static void read_from_pipe(const endless *e) {
 #define PDB OVOID_MOLECULE_PDB
 #define CIF OVOID_MOLECULE_MMCIF
 #define XYZR OVOID_MOLECULE_XYZR
+#define CIF_MODELS                                                                                 \
+    "loop_\n_atom_site.Cartn_x\n_atom_site.Cartn_y\n_atom_site.Cartn_z\n"                          \
+    "_atom_site.pdbx_PDB_model_num\n"
 #define PDB_CHAINS "REMARK 350 APPLY THE FOLLOWING TO CHAINS: A\n"
 
 static void memory_follows_atoms_alone(void **state) {
@@ -359,6 +362,8 @@ static void memory_follows_atoms_alone(void **state) {
          "more than 100000 operators"},
         {MOLECULE, CIF, CIF_PARTS, "@ 1 A\n", 20, "", OVOID_ERROR_LIMIT,
          "more than 10000 parts of assemblies"},
+        {MOLECULE, CIF, CIF_MODELS, "0 0 0 @\n", 20, "", OVOID_ERROR_LIMIT,
+         "more than 1000000 models"},
         {MOLECULE, PDB, PDB_CHAINS, "REMARK 350 AND CHAINS: A, B, C, D, E, F\n", 60, "",
          OVOID_ERROR_LIMIT, "bytes of text about assemblies"},
         {MOLECULE, XYZR, "99999999999999999999\n", "0 0 @ 1\n", 0, "0 0 0 1\n", OVOID_ERROR_FORMAT,

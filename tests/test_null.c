@@ -207,6 +207,8 @@ static void molecules(void **state) {
     ANSWERS(NULL, ovoid_molecule_residues, all.molecule, NULL);
     ANSWERS(NULL, ovoid_molecule_guesses, NULL, &count);
     ANSWERS(NULL, ovoid_molecule_guesses, all.molecule, NULL);
+    ANSWERS(NULL, ovoid_molecule_models, NULL, &count);
+    assert_non_null(ovoid_molecule_models(all.molecule, NULL));
     ANSWERS(NULL, ovoid_molecule_assemblies, NULL, &count);
     ANSWERS(NULL, ovoid_molecule_assemblies, all.molecule, NULL);
     ANSWERS(NULL, ovoid_molecule_placements, NULL, &count);

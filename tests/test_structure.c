@@ -126,6 +126,39 @@ static void pdb_files_are_read(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+static void expect_models(const char *name, const char *text, const int32_t *numbers,
+                          size_t count) {
+    ovoid_molecule *molecule = NULL;
+    size_t found;
+    assert_int_equal(read_text(name, text, NULL, &molecule), OVOID_OK);
+    const int32_t *models = ovoid_molecule_models(molecule, &found);
+    assert_int_equal(found, count);
+    assert_memory_equal(models, numbers, count * sizeof *numbers);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Ascending and each once, wherever their atoms are. */
+static void models_are_numbered(void **state) {
+    (void)state;
+    static const int32_t three_four[] = {3, 4}, one[] = {1}, mixed[] = {2, 7, 9};
+    char cif[8192];
+    size_t used = (size_t)snprintf(cif, sizeof cif,
+                                   "data_\nloop_\n_atom_site.Cartn_x\n_atom_site.Cartn_y\n"
+                                   "_atom_site.Cartn_z\n_atom_site.pdbx_PDB_model_num\n");
+    for (int i = 0; i < 120; i++)
+        used += (size_t)snprintf(cif + used, sizeof cif - used, "%d 0 0 %d\n", 2 * i,
+                                 mixed[(i + 1) % 3]);
+    expect_models("m.cif", cif, mixed, 3);
+    expect_models("m.pdb", pdb, three_four, 2);
+    expect_models("m.xyzr", "0 0 0 1\n", one, 1);
+    expect_models("m.pdb",
+                  "MODEL 9\nATOM      1  N   ALA A   5      11.104   6.134  -6.504\nENDMDL\n"
+                  "MODEL 2\nATOM      1  N   ALA A   5      11.104   6.134  -6.504\nENDMDL\n"
+                  "MODEL 7\nATOM      1  N   ALA A   5      11.104   6.134  -6.504\nENDMDL\n"
+                  "MODEL 2\nATOM      1  N   ALA A   5      11.104   6.134  -6.504\nENDMDL\n",
+                  mixed, 3);
+}
+
 static void choices_are_followed(void **state) {
     (void)state;
     ovoid_read_options o = defaults();
@@ -734,6 +767,7 @@ static void known_names_are_ended(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pdb_files_are_read),
+        cmocka_unit_test(models_are_numbered),
         cmocka_unit_test(choices_are_followed),
         cmocka_unit_test(pdb_errors_say_where),
         cmocka_unit_test(wide_columns_are_read),

@@ -85,7 +85,7 @@ static const struct {
              SIZE(ovoid_atom),          SIZE(ovoid_residue),           SIZE(ovoid_guess),
              SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options),
              SIZE(ovoid_check),         SIZE(ovoid_selftest_options),  SIZE(ovoid_selftest_result),
-             SIZE(ovoid_scene)};
+             SIZE(ovoid_scene),         SIZE(ovoid_parts_options)};
 #undef SIZE
 
 size_t ovoid_sizeof(const char *type) {

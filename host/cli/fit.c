@@ -102,6 +102,11 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
         options.adaptive.ellipsoids = (uint32_t)(now[-1].result.ellipsoids / 2);
     }
     ovoid_fit_result_init(&now->result, sizeof now->result);
+    if (level > 0 && job->session) {
+        const ovoid_status status = ovoid_fitter_start_from(job->context, job->fitter, NULL);
+        if (status != OVOID_OK)
+            return status;
+    }
     ovoid_context_on_progress(job->context, on_progress, job);
     ovoid_status status =
         ovoid_fitter_reach(job->context, job->fitter, &options, &now->model, &now->result);
@@ -152,13 +157,17 @@ static ovoid_status fit_others(fit_job *job, int *code) {
 /* All levels, from one preparation of the molecule. */
 static ovoid_status fit_levels(fit_job *job, int *code) {
     job->fit_began = cli_seconds();
-    ovoid_status status =
-        ovoid_fitter_create(job->context, job->molecule, &job->options, &job->fitter);
+    ovoid_status status = job->session ? fit_session_join(job)
+                                       : ovoid_fitter_create(job->context, job->molecule,
+                                                             &job->options, &job->fitter);
     if (status == OVOID_OK)
         status = fit_one(job, 0);
     if (status == OVOID_OK)
         status = fit_others(job, code);
-    ovoid_fitter_destroy(&job->fitter);
+    if (!job->session)
+        ovoid_fitter_destroy(&job->fitter);
+    else if (status == OVOID_OK)
+        fit_session_remember(job);
     return status;
 }
 
@@ -368,6 +377,8 @@ static int list_assemblies(const fit_job *job) {
 static int run(fit_job *job) {
     if (reading_lists(&job->reading))
         return list_assemblies(job);
+    if (job->all_models)
+        return fit_models(job);
     return job->folder ? fit_batch(job) : fit_run(job);
 }
 

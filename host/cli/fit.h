@@ -31,6 +31,13 @@ typedef struct fit_level {
     ovoid_measures measures;
 } fit_level;
 
+/* What goes from one model of a file to the next. */
+typedef struct fit_session {
+    ovoid_fitter *fitter;     /* NULL: none yet */
+    ovoid_molecule *molecule; /* that it is at */
+    int32_t model;            /* number of the last one that was fitted, 0: none was */
+} fit_session;
+
 typedef struct fit_job {
     /* what was asked */
     const char *input;
@@ -43,7 +50,11 @@ typedef struct fit_job {
     const char *folder;  /* NULL: one molecule; else of several, where all goes (see fit_batch.c) */
     char *const *inputs; /* of several molecules */
     size_t input_count;
-    const char *label; /* what a progress line begins with, NULL: nothing */
+    bool all_models;        /* --models all: the inputs are one file again and again, ... */
+    const int32_t *numbers; /* ... and these the numbers of its models; NULL: not read yet */
+    int32_t number;         /* of the model that this job is about; 0: --models was not asked */
+    fit_session *session;   /* NULL: the job has a fitter of its own */
+    const char *label;      /* what a progress line begins with, NULL: nothing */
     bool quiet;
     reading reading;
     ovoid_fit_options options; /* with the method's spacing, never 0 */
@@ -57,7 +68,8 @@ typedef struct fit_job {
     FILE *summary; /* NULL: none */
     ovoid_context *context;
     ovoid_molecule *molecule;
-    ovoid_fitter *fitter;             /* during the fits */
+    ovoid_fitter *fitter;             /* during the fits; with a session until that takes it */
+    int32_t moved_from;               /* model that the session began with; 0: with the atoms */
     bool out_of_time;                 /* the time limit ended them */
     fit_level levels[FIT_LEVELS_MAX]; /* all have their paths from the start */
     size_t levels_done; /* have their models; fewer than asked for where halving ends */
@@ -89,11 +101,15 @@ extern const cli_number fit_levels_number, fit_time_limit_number, fit_mesh_spaci
 
 /* ---- fit_outputs.c --------------------------------------------------------------------------- */
 
-/* Names every level's files. False: it cannot be, all said. */
+/* Names every level's files. In job->folder, output, trace and owners are called as the molecule,
+ * and what was asked for as trace and owners is the ending. With job->number, "out.ovoid" becomes
+ * "out.model3.ovoid". False: it cannot be, all said. */
 bool fit_outputs_name(fit_job *job);
-/* The same in job->folder: output, trace and owners are called as the molecule, and there what was
- * asked for as trace and owners is the ending. */
-bool fit_outputs_name_in_folder(fit_job *job);
+/* What the models' files of --models are called, "out.modelN.ovoid"; NULL without memory, else to
+ * be freed. */
+char *fit_outputs_pattern(const fit_job *job);
+/* Whether there can be a file for each model where one was named; says so if not. */
+bool fit_outputs_take_models(const fit_job *job);
 /* Whether no file would be written twice or over the molecule; says so if not. */
 bool fit_outputs_check(const fit_job *job);
 void fit_outputs_destroy(fit_job *job);
@@ -117,6 +133,23 @@ const char *fit_distance(double distance, double above, char text[FIT_DISTANCE_T
 /* Why the goal was not reached, NULL where it was. */
 enum { FIT_REASON_TEXT = 160 };
 const char *fit_unreached(const fit_job *job, char text[FIT_REASON_TEXT]);
+
+/* ---- fit_session.c, fit_models.c ------------------------------------------------------------- */
+
+/* The job's fitter: the session's, moved to its molecule, or a new one where the session has none
+ * for the same atoms. */
+ovoid_status fit_session_join(fit_job *job);
+/* With more levels than one: the first of them is what the next model begins with. */
+void fit_session_remember(fit_job *job);
+/* Takes the job's fitter and molecule for the next one. */
+void fit_session_keep(fit_job *job);
+void fit_session_destroy(fit_session *session);
+
+/* Whether all models of the file can be fitted as asked, as far as is known before it is read; says
+ * why not. */
+bool fit_models_check(const fit_job *job);
+/* Fits each of them; returns the exit code, all said. */
+int fit_models(fit_job *job);
 
 /* ---- fit_notes.c, owners.c ------------------------------------------------------------------- */
 
@@ -150,7 +183,8 @@ ovoid_status fit_report_write(const fit_job *job);
 /* What came of one of several molecules. */
 typedef struct fit_row {
     const char *input;
-    int code; /* as if it were the only one */
+    int32_t model; /* its number, 0: rows are files */
+    int code;      /* as if it were the only one */
     bool measured;
     uint64_t atoms, ellipsoids; /* 0: not known */
     double distance;            /* NAN: not known */
@@ -160,15 +194,15 @@ typedef struct fit_row {
 
 /* Whether several molecules can be fitted as asked; says why not. */
 bool fit_batch_check(const fit_job *job);
-/* Fits job->inputs one after the other into job->folder; returns the exit code, all said. */
+/* Fits job->inputs one after the other into job->folder, if that is not NULL; returns the exit
+ * code, all said. */
 int fit_batch(fit_job *job);
 
 /* Of a molecule's exit code: whether there is a model of it, and what became of it in a word. */
 bool fit_made_model(int code);
 const char *fit_status_name(int code);
 
-/* A row each, and how many were fitted, of `asked`. */
-void fit_batch_print(FILE *out, const fit_row *rows, size_t count, size_t asked,
-                     const char *folder);
+/* A row each, and how many were fitted of those that were asked. */
+void fit_batch_print(FILE *out, const fit_job *asked, const fit_row *rows, size_t count);
 
 #endif

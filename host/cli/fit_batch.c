@@ -25,7 +25,8 @@ static cJSON *make_line(const fit_job *one, int code) {
     bool good = line != NULL;
     if (good && !one->written)
         good = cli_json_string(line, "version", ovoid_version()) &&
-               cli_json_string(line, "input", one->input);
+               cli_json_string(line, "input", one->input) &&
+               (!one->number || cJSON_AddNumberToObject(line, "model", one->number));
     good = good && cli_json_string(line, "status", fit_status_name(code)) &&
            cJSON_AddNumberToObject(line, "exit_code", code);
     if (good && !fit_made_model(code))
@@ -71,6 +72,7 @@ static int write_lines(batch *b) {
 static fit_row make_row(const fit_job *one, int code) {
     const fit_level *const level = &one->levels[0];
     return (fit_row){.input = one->input,
+                     .model = one->number,
                      .code = code,
                      .measured = one->written && level->measured,
                      .atoms = one->molecule ? ovoid_molecule_atoms(one->molecule) : 0,
@@ -81,9 +83,15 @@ static fit_row make_row(const fit_job *one, int code) {
                      .seconds = cli_seconds() - one->started};
 }
 
-/* "3/10 name", with as much of the name as leaves room for other parts of a progress line. */
+/* "3/10 model 7", or "3/10 name" with as much of the name as leaves room for other parts of a
+ * progress line. */
 static void make_label(const fit_job *asked, size_t index, char *label, size_t size) {
     enum { ROOM = 20 };
+    if (asked->numbers) {
+        snprintf(label, size, "%zu/%zu model %d", index + 1, asked->input_count,
+                 (int)asked->numbers[index]);
+        return;
+    }
     const char *const input = asked->inputs[index], *const slash = strrchr(input, '/');
     const char *const name = slash ? slash + 1 : input;
     size_t length = strlen(name);
@@ -93,18 +101,33 @@ static void make_label(const fit_job *asked, size_t index, char *label, size_t s
     snprintf(label, size, "%zu/%zu %.*s", index + 1, asked->input_count, (int)length, name);
 }
 
+/* What messages are about: the file, or the model of it. */
+static char *make_subject(const fit_job *one) {
+    const size_t size = strlen(one->input) + 32;
+    char *const text = malloc(size);
+    if (text && one->number)
+        snprintf(text, size, "%s, model %d", one->input, (int)one->number);
+    else if (text)
+        strcpy(text, one->input);
+    return text;
+}
+
 static void run_one(batch *b, size_t index) {
     char label[96];
     fit_job one = *b->asked;
     one.input = one.inputs[index];
+    one.number = one.numbers ? one.numbers[index] : 0;
+    if (one.number)
+        one.reading.options.model = one.number;
+    char *const subject = make_subject(&one);
     one.report = NULL;
     one.summary = NULL;
     one.profile = (cli_profile){0};
     one.started = cli_seconds();
     one.label = label;
     make_label(&one, index, label, sizeof label);
-    cli_message_subject(one.input);
-    const int code = fit_outputs_name_in_folder(&one) ? fit_run(&one) : CLI_COMPUTE;
+    cli_message_subject(subject ? subject : one.input);
+    const int code = fit_outputs_name(&one) ? fit_run(&one) : CLI_COMPUTE;
     if (code < 128) { /* not stopped by a signal */
         b->rows[b->done++] = make_row(&one, code);
         add_line(b, &one, code);
@@ -112,7 +135,10 @@ static void run_one(batch *b, size_t index) {
     cli_message_subject(NULL);
     cli_progress_erase();
     cli_progress_start(one.quiet, NULL); /* the label ends here */
+    if (one.session)
+        fit_session_keep(&one);
     fit_job_destroy(&one);
+    free(subject);
 }
 
 /* ---- all of them ---------------------------------------------------------------------------- */
@@ -128,7 +154,7 @@ static int make_folder(const char *folder) {
 static int prepare(batch *b) {
     fit_job *const asked = b->asked;
     ovoid_status status;
-    const int code = make_folder(asked->folder);
+    const int code = asked->folder ? make_folder(asked->folder) : CLI_OK;
     if (code != CLI_OK)
         return code;
     if (asked->report && (status = ovoid_file_check(asked->context, asked->report)) != OVOID_OK)
@@ -169,7 +195,7 @@ static int finish(batch *b) {
     if (asked->report)
         own = write_lines(b);
     if (asked->summary) {
-        fit_batch_print(asked->summary, b->rows, b->done, asked->input_count, asked->folder);
+        fit_batch_print(asked->summary, asked, b->rows, b->done);
         if (asked->report && own == CLI_OK)
             fprintf(asked->summary, "report written to %s\n",
                     strcmp(asked->report, "-") == 0 ? "standard output" : asked->report);

@@ -43,10 +43,11 @@ static void add_output(names *n, char **path, const char *input) {
 }
 
 /* All that one molecule's job would write. */
-static bool add_outputs(names *n, const fit_job *asked, const char *input) {
+static bool add_outputs(names *n, const fit_job *asked, const char *input, int32_t number) {
     fit_job one = *asked;
     one.input = input;
-    const bool named = fit_outputs_name_in_folder(&one);
+    one.number = number;
+    const bool named = fit_outputs_name(&one);
     for (size_t i = 0; named && i < one.level_count; i++) {
         add_output(n, &one.levels[i].path, input);
         add_output(n, &one.levels[i].owners, input);
@@ -70,7 +71,7 @@ static bool collect(names *n, const fit_job *asked) {
         const char *const input = asked->inputs[i];
         if (stat(input, &info) == 0 && S_ISREG(info.st_mode))
             n->origins[n->origin_count++] = (origin){info.st_dev, info.st_ino, input};
-        if (!add_outputs(n, asked, input))
+        if (!add_outputs(n, asked, input, asked->numbers ? asked->numbers[i] : 0))
             return false;
     }
     qsort(n->outputs, n->count, sizeof *n->outputs, by_path);
@@ -78,12 +79,14 @@ static bool collect(names *n, const fit_job *asked) {
     return true;
 }
 
-static bool check_twice(const names *n) {
+static bool check_twice(const names *n, const fit_job *asked) {
     for (size_t i = 1; i < n->count; i++) {
         const output *const a = &n->outputs[i - 1], *const b = &n->outputs[i];
         if (by_path(a, b) != 0)
             continue;
-        if (strcmp(a->input, b->input) == 0)
+        if (asked->numbers)
+            cli_error("two of the files that come of '%s' would be '%s'", a->input, a->path);
+        else if (strcmp(a->input, b->input) == 0)
             cli_error("'%s' is named twice", a->input);
         else
             cli_error("'%s' and '%s' would both be written to '%s': fit them one at a time or into "
@@ -137,6 +140,8 @@ static bool check_ending(const char *option, const char *ending) {
 }
 
 static bool check_options(const fit_job *asked) {
+    if (!asked->folder) /* the models of one file */
+        return true;
     if (asked->output) {
         cli_error("-o names the file of one model: with several molecules or --out-dir, models "
                   "are called as their molecules, in the folder that --out-dir names");
@@ -152,7 +157,7 @@ static bool check_options(const fit_job *asked) {
 
 bool fit_batch_check(const fit_job *asked) {
     names n = {0};
-    const bool good = check_options(asked) && collect(&n, asked) && check_twice(&n) &&
+    const bool good = check_options(asked) && collect(&n, asked) && check_twice(&n, asked) &&
                       check_origins(&n) && check_report(&n, asked);
     for (size_t i = 0; i < n.count; i++)
         free(n.outputs[i].path);

@@ -1,9 +1,10 @@
 #include "fit.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-enum { NAME_LEAST = 4, NAME_MOST = 48 };
+enum { NAME_LEAST = 4, NAME_MOST = 48, MODEL_WIDTH = 5 };
 
 bool fit_made_model(int code) {
     return code == CLI_OK || code == CLI_GOAL;
@@ -49,7 +50,10 @@ static void print_status(FILE *out, int code) {
 
 /* Names may be longer than their column. */
 static void print_row(FILE *out, const fit_row *row, int width) {
-    fprintf(out, "%-*s", width, row->input);
+    if (row->model)
+        fprintf(out, "%*d", width, (int)row->model);
+    else
+        fprintf(out, "%-*s", width, row->input);
     print_count(out, 8, row->atoms);
     print_count(out, 10, row->ellipsoids);
     print_value(out, 4, isfinite(row->distance), row->distance);
@@ -59,22 +63,34 @@ static void print_row(FILE *out, const fit_row *row, int width) {
     print_status(out, row->code);
 }
 
-void fit_batch_print(FILE *out, const fit_row *rows, size_t count, size_t asked,
-                     const char *folder) {
-    const int width = name_width(rows, count);
+/* How many, of what, and where they are. */
+static void print_fitted(FILE *out, const fit_job *asked, size_t fitted) {
+    const char *const plural = asked->input_count == 1 ? "" : "s";
+    fprintf(out, "%zu of %zu ", fitted, asked->input_count);
+    if (!asked->numbers) {
+        fprintf(out, "molecule%s fitted, models in %s", plural, asked->folder);
+        return;
+    }
+    char *const pattern = fit_outputs_pattern(asked);
+    fprintf(out, "model%s of %s fitted, written to %s", plural, asked->input,
+            pattern ? pattern : "their files");
+    free(pattern);
+}
+
+void fit_batch_print(FILE *out, const fit_job *asked, const fit_row *rows, size_t count) {
+    const int width = asked->numbers ? MODEL_WIDTH : name_width(rows, count);
     size_t fitted = 0;
     fprintf(out,
             "%-*s     atoms  ellipsoids  distance Å     area Å²   volume Å³   seconds  status\n",
-            width, "file");
+            width, asked->numbers ? "model" : "file");
     for (size_t i = 0; i < count; i++) {
         print_row(out, &rows[i], width);
         fitted += fit_made_model(rows[i].code);
     }
-    fprintf(out, "%zu of %zu molecule%s fitted, models in %s", fitted, asked, asked == 1 ? "" : "s",
-            folder);
+    print_fitted(out, asked, fitted);
     if (count > fitted)
         fprintf(out, "; %zu failed", count - fitted);
-    if (asked > count)
-        fprintf(out, "; %zu left out", asked - count);
+    if (asked->input_count > count)
+        fprintf(out, "; %zu left out", asked->input_count - count);
     putc('\n', out);
 }

@@ -33,6 +33,13 @@ static void print_files(FILE *stream) {
           "were fitted. With them, and with --out-dir, the FILE of --trace and --owners is the\n"
           "ending of names in DIR: --owners owners.csv writes DIR/NAME.owners.csv.\n",
           stream);
+    cli_option_help(
+        "--models all",
+        "fit every model of a PDB or mmCIF file, such as an NMR ensemble, each beginning with the "
+        "one before where the atoms are the same; FILE.ovoid becomes FILE.model1.ovoid, "
+        "FILE.model2.ovoid and so on by the models' numbers, and those of --trace and --owners "
+        "accordingly",
+        stream);
     fputs("\nFiles appear whole at the end or not at all; those that exist are replaced.\n",
           stream);
 }
@@ -143,19 +150,21 @@ void cli_fit_help(FILE *stream) {
     print_surface(&defaults, &measuring, stream);
     print_adaptive(&defaults, stream);
     print_l1(&defaults, stream);
-    fputs("\n"
-          "Examples:\n"
-          "  ovoid fit molecule.pqr                          to molecule.ovoid, within 0.5 Å\n"
-          "  ovoid fit 1abc.cif.gz --select A                chain A of a PDB entry\n"
-          "  ovoid fit molecule.pqr --tolerance 0.2          closer, with more ellipsoids\n"
-          "  ovoid fit molecule.pqr --ellipsoids 50          the best that 50 can do\n"
-          "  ovoid fit molecule.pqr --ratio 0.1 --levels 4   10 % of the atoms, 5 %, 2.5 %, 1.2 %\n"
-          "  ovoid fit molecule.pqr -o model.ovoid --report report.json --device gpu\n"
-          "  ovoid fit molecule.pqr --method l1              by the paper's Algorithm 1\n"
-          "  ovoid fit *.pqr --out-dir models                many, to models/NAME.ovoid\n"
-          "  ovoid fit - -o model.ovoid < molecule.pqr       from standard input\n"
-          "\n",
-          stream);
+    fputs(
+        "\n"
+        "Examples:\n"
+        "  ovoid fit molecule.pqr                          to molecule.ovoid, within 0.5 Å\n"
+        "  ovoid fit 1abc.cif.gz --select A                chain A of a PDB entry\n"
+        "  ovoid fit molecule.pqr --tolerance 0.2          closer, with more ellipsoids\n"
+        "  ovoid fit molecule.pqr --ellipsoids 50          the best that 50 can do\n"
+        "  ovoid fit molecule.pqr --ratio 0.1 --levels 4   10 % of the atoms, 5 %, 2.5 %, 1.2 %\n"
+        "  ovoid fit molecule.pqr -o model.ovoid --report report.json --device gpu\n"
+        "  ovoid fit molecule.pqr --method l1              by the paper's Algorithm 1\n"
+        "  ovoid fit *.pqr --out-dir models                many, to models/NAME.ovoid\n"
+        "  ovoid fit nmr.pdb --models all -o m.ovoid       to m.model1.ovoid, m.model2.ovoid ...\n"
+        "  ovoid fit - -o model.ovoid < molecule.pqr       from standard input\n"
+        "\n",
+        stream);
     cli_print_environment(stream);
     putc('\n', stream);
     cli_print_exit_codes(stream);

@@ -70,6 +70,16 @@ static ovoid_status annotate_result(const fit_job *job, size_t level, ovoid_mode
     return status;
 }
 
+/* Which model of the file, and which one was before it, if that counts. */
+static ovoid_status annotate_number(const fit_job *job, ovoid_model *model) {
+    char text[64];
+    int used = snprintf(text, sizeof text, "%d", (int)job->number);
+    if (job->moved_from)
+        snprintf(text + used, sizeof text - (size_t)used, ", moved on from model %d",
+                 (int)job->moved_from);
+    return annotate(job, model, "model", text);
+}
+
 ovoid_status fit_annotate(const fit_job *job, size_t level) {
     const ovoid_device_info *device = ovoid_context_device(job->context);
     ovoid_model *model = job->levels[level].model;
@@ -77,6 +87,8 @@ ovoid_status fit_annotate(const fit_job *job, size_t level) {
     snprintf(text, sizeof text, "ovoid %s", ovoid_version());
     ovoid_status status = annotate(job, model, "program", text);
     if (status != OVOID_OK || (status = annotate(job, model, "input", job->input)) != OVOID_OK)
+        return status;
+    if (job->number && (status = annotate_number(job, model)) != OVOID_OK)
         return status;
     snprintf(text, sizeof text, "%s (%s, driver %s)", device->name, device->platform,
              device->driver);

@@ -125,6 +125,7 @@ enum {
     TRACE,
     OWNERS,
     OUT_DIR,
+    MODELS,
     QUIET,
     KERNEL,
     FIRST_STEP,
@@ -147,6 +148,7 @@ static const struct option named[] = {
     {"trace", required_argument, NULL, TRACE},
     {"owners", required_argument, NULL, OWNERS},
     {"out-dir", required_argument, NULL, OUT_DIR},
+    {"models", required_argument, NULL, MODELS},
     {"quiet", no_argument, NULL, QUIET},
     READING_OPTIONS,
     {"kernel", required_argument, NULL, KERNEL},
@@ -327,12 +329,14 @@ static bool complete_options(const parser *p) {
 /* One file holds the parts of one fit. */
 static bool check_checkpoint(const fit_job *job) {
     const ovoid_parts_options *parts = &job->options.parts;
-    const char *const with = job->folder ? "several molecules, or --out-dir" : "--levels";
+    const char *const with = job->all_models ? "--models"
+                             : job->folder   ? "several molecules, or --out-dir"
+                                             : "--levels";
     if (parts->resume && !parts->checkpoint) {
         cli_error("--resume goes on from a checkpoint: name its file, --checkpoint FILE");
         return false;
     }
-    if (parts->checkpoint && (job->folder || job->level_count > 1)) {
+    if (parts->checkpoint && (job->all_models || job->folder || job->level_count > 1)) {
         cli_error("--checkpoint does not go with %s: it holds the parts of one fit", with);
         return false;
     }
@@ -350,10 +354,12 @@ static bool complete(int argc, char **argv, const parser *p) {
     job->input = argv[optind];
     job->inputs = argv + optind;
     job->input_count = (size_t)(argc - optind);
-    if (job->input_count > 1 && !job->folder)
+    if (job->input_count > 1 && !job->folder && !job->all_models)
         job->folder = ".";
     if (!check_checkpoint(job))
         return false;
+    if (job->all_models)
+        return fit_models_check(job);
     return job->folder ? fit_batch_check(job) : fit_outputs_name(job) && fit_outputs_check(job);
 }
 
@@ -390,6 +396,11 @@ static bool parse_named(parser *p, int option) {
     case OUT_DIR:
         job->folder = optarg;
         return true;
+    case MODELS:
+        job->all_models = strcmp(optarg, "all") == 0;
+        if (!job->all_models)
+            cli_error("--models takes all, not '%s'; --model N fits one of them", optarg);
+        return job->all_models;
     case 'q':
     case QUIET:
         job->quiet = true;

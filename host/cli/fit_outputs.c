@@ -4,20 +4,27 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* "model.ovoid" as "model.level2.ovoid"; NULL without memory. */
-static char *level_path(const char *path, size_t level) {
+/* "model.ovoid" as "modelTEXT.ovoid"; NULL without memory. */
+static char *insert(const char *path, const char *text) {
     const char *slash = strrchr(path, '/');
     const char *base = slash ? slash + 1 : path;
     const char *dot = strrchr(base, '.');
     if (!dot || dot == base) /* a dot in front makes no extension */
         dot = base + strlen(base);
-    const size_t size = strlen(path) + 32;
+    const size_t size = strlen(path) + strlen(text) + 1;
     char *name = malloc(size);
-    if (name && level == 0)
-        strcpy(name, path);
-    else if (name)
-        snprintf(name, size, "%.*s.level%zu%s", (int)(dot - path), path, level + 1, dot);
+    if (name)
+        snprintf(name, size, "%.*s%s%s", (int)(dot - path), path, text, dot);
     return name;
+}
+
+enum { INSERTED = 32 };
+
+static char *level_path(const char *path, size_t level) {
+    char text[INSERTED] = "";
+    if (level > 0)
+        snprintf(text, sizeof text, ".level%zu", level + 1);
+    return insert(path, text);
 }
 
 static bool out_of_memory(void) {
@@ -25,36 +32,37 @@ static bool out_of_memory(void) {
     return false;
 }
 
-/* Whether there can be several files beside the one at `path`: `what` with the option that names
- * it. */
-static bool takes_levels(const char *path, const char *what, const char *option) {
+/* Whether an option that writes several of `what` has room for them beside the file at `path`,
+ * which `named` names. */
+static bool takes_several(const char *option, const char *path, const char *what,
+                          const char *named) {
     struct stat info;
     if (strcmp(path, "-") == 0) {
-        cli_error("--levels writes several %s, which standard output cannot take: name the first "
-                  "one's file with %s",
-                  what, option);
+        cli_error("%s writes several %s, which standard output cannot take: name the first one's "
+                  "file with %s",
+                  option, what, named);
         return false;
     }
     /* A folder is refused as for one model. */
     if (stat(path, &info) == 0 && !S_ISREG(info.st_mode) && !S_ISDIR(info.st_mode)) {
-        cli_error("--levels writes several %s, but '%s' is no regular file", what, path);
+        cli_error("%s writes several %s, but '%s' is no regular file", option, what, path);
         return false;
     }
     return true;
 }
 
-bool fit_outputs_name(fit_job *job) {
-    if (!job->output && strcmp(job->input, "-") == 0) {
-        cli_error("a molecule from standard input has no name: name the model's file with -o");
-        return false;
-    }
-    if (!job->output)
-        job->output = job->own_output = source_output(job->input, ".ovoid");
-    if (!job->output)
-        return out_of_memory();
-    if (job->level_count > 1 &&
-        (!takes_levels(job->output, "models", "-o") ||
-         (job->owners && !takes_levels(job->owners, "tables of owners", "--owners"))))
+static bool all_take_several(const char *option, const char *output, const char *owners) {
+    return (!output || takes_several(option, output, "models", "-o")) &&
+           (!owners || takes_several(option, owners, "tables of owners", "--owners"));
+}
+
+bool fit_outputs_take_models(const fit_job *job) {
+    return all_take_several("--models", job->output, job->owners) &&
+           (!job->trace || takes_several("--models", job->trace, "traces", "--trace"));
+}
+
+static bool name_levels(fit_job *job) {
+    if (job->level_count > 1 && !all_take_several("--levels", job->output, job->owners))
         return false;
     for (size_t i = 0; i < job->level_count; i++) {
         fit_level *level = &job->levels[i];
@@ -64,6 +72,32 @@ bool fit_outputs_name(fit_job *job) {
             return out_of_memory();
     }
     return true;
+}
+
+/* The path with the model's number in it. */
+static bool number_path(const char **path, char **own, int32_t number) {
+    char text[INSERTED];
+    if (!*path)
+        return true;
+    snprintf(text, sizeof text, ".model%d", (int)number);
+    char *const made = insert(*path, text);
+    free(*own);
+    *path = *own = made;
+    return made || out_of_memory();
+}
+
+static bool name_here(fit_job *job) {
+    if (!job->output && strcmp(job->input, "-") == 0) {
+        cli_error("a molecule from standard input has no name: name the model's file with -o");
+        return false;
+    }
+    if (!job->output)
+        job->output = job->own_output = source_output(job->input, ".ovoid");
+    if (!job->output)
+        return out_of_memory();
+    return !job->number || (number_path(&job->output, &job->own_output, job->number) &&
+                            number_path(&job->trace, &job->own_trace, job->number) &&
+                            number_path(&job->owners, &job->own_owners, job->number));
 }
 
 /* "FOLDER/NAME.ENDING"; NULL without memory. */
@@ -76,8 +110,11 @@ static char *path_in(const char *folder, const char *name, const char *ending) {
     return path;
 }
 
-bool fit_outputs_name_in_folder(fit_job *job) {
-    char *name = source_output(job->input, "");
+static bool name_in_folder(fit_job *job) {
+    char text[INSERTED] = "";
+    if (job->number)
+        snprintf(text, sizeof text, ".model%d", (int)job->number);
+    char *name = source_output(job->input, text);
     if (!name)
         return out_of_memory();
     const bool owners = job->owners != NULL, trace = job->trace != NULL;
@@ -87,9 +124,20 @@ bool fit_outputs_name_in_folder(fit_job *job) {
     if (owners)
         job->owners = job->own_owners = path_in(job->folder, name, job->owners);
     free(name);
-    if (!job->output || (owners && !job->owners) || (trace && !job->trace))
-        return out_of_memory();
-    return fit_outputs_name(job);
+    return (job->output && (!owners || job->owners) && (!trace || job->trace)) || out_of_memory();
+}
+
+bool fit_outputs_name(fit_job *job) {
+    return (job->folder ? name_in_folder(job) : name_here(job)) && name_levels(job);
+}
+
+char *fit_outputs_pattern(const fit_job *job) {
+    char *const name = source_output(job->input, job->folder ? ".modelN" : ".ovoid");
+    char *const pattern = !name         ? NULL
+                          : job->folder ? path_in(job->folder, name, "ovoid")
+                                        : insert(job->output ? job->output : name, ".modelN");
+    free(name);
+    return pattern;
 }
 
 void fit_outputs_destroy(fit_job *job) {

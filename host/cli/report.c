@@ -42,17 +42,19 @@ static void add_numbers(builder *b, const cli_number *numbers, size_t count,
     }
 }
 
-static void add_molecule(builder *b, const fit_job *job) {
-    add_string(b, "input", job->input);
-    b->good = b->good && reading_report(&job->reading, b->object, job->molecule);
-}
-
 /* A finite number or null. */
 static void add_finite(builder *b, const char *key, double value) {
     if (isfinite(value))
         add_number(b, key, value);
     else
         b->good = b->good && cJSON_AddNullToObject(b->object, key);
+}
+
+static void add_molecule(builder *b, const fit_job *job) {
+    add_string(b, "input", job->input);
+    b->good = b->good && reading_report(&job->reading, b->object, job->molecule);
+    if (job->number)
+        add_finite(b, "moved_from", job->moved_from ? job->moved_from : NAN);
 }
 
 /* Of the method that was used, and no other. */

@@ -545,6 +545,7 @@ void ovoid_molecule_destroy(ovoid_molecule **molecule) {
     if (!molecule || !*molecule)
         return;
     free((*molecule)->xyzr);
+    free((*molecule)->models);
     free((*molecule)->identity);
     free((*molecule)->residues);
     free((*molecule)->guesses);
@@ -641,6 +642,14 @@ ovoid_radii ovoid_molecule_radii(const ovoid_molecule *molecule) {
 
 int32_t ovoid_molecule_model(const ovoid_molecule *molecule) {
     return molecule ? molecule->model : 0;
+}
+
+const int32_t *ovoid_molecule_models(const ovoid_molecule *molecule, size_t *count) {
+    static const int32_t one = 1;
+    const bool any = molecule && molecule->models;
+    if (count)
+        *count = any ? molecule->model_count : molecule != NULL;
+    return any ? molecule->models : molecule ? &one : NULL;
 }
 
 const ovoid_atom *ovoid_molecule_identity(const ovoid_molecule *molecule) {

@@ -29,6 +29,8 @@ struct ovoid_molecule {
     ovoid_molecule_format format;
     ovoid_radii radii;
     int32_t model;
+    int32_t *models; /* numbers of all in the file, ascending, owned; NULL: 1 alone */
+    size_t model_count;
     ovoid_guess *guesses;
     size_t guess_count;
 

@@ -13,6 +13,7 @@ void ov_sites_init(ov_sites *sites) {
 void ov_sites_destroy(ov_sites *sites) {
     free(sites->extra);
     free(sites->residue_extra);
+    free(sites->numbers);
     ov_sites_init(sites);
 }
 
@@ -40,6 +41,60 @@ void ov_sites_end_model(ov_sites *sites) {
     sites->model_ended = sites->model_any;
 }
 
+enum { MODELS_MAX = 1000000 }; /* a trajectory of so many frames is no longer written as text */
+
+static int by_number(const void *a, const void *b) {
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Ascending, each once. */
+static void sort_numbers(ov_sites *sites) {
+    size_t kept = 0;
+    qsort(sites->numbers, sites->number_count, sizeof *sites->numbers, by_number);
+    for (size_t i = 0; i < sites->number_count; i++)
+        if (kept == 0 || sites->numbers[i] != sites->numbers[kept - 1])
+            sites->numbers[kept++] = sites->numbers[i];
+    sites->number_count = kept;
+}
+
+/* Where the atoms of models alternate, a number comes again and again: the array grows with the
+ * numbers, not with how often they come. */
+static ovoid_status make_room(ov_reader *reader) {
+    ov_sites *sites = &reader->sites;
+    if (sites->number_count < sites->number_room)
+        return OVOID_OK;
+    if (sites->number_count)
+        sort_numbers(sites);
+    if (sites->number_count > MODELS_MAX)
+        return ov_fail(reader->context, OVOID_ERROR_LIMIT, "%s: more than %d models",
+                       ov_text_name(reader->text), (int)MODELS_MAX);
+    return ov_grow(reader->context, &sites->numbers, &sites->number_room,
+                   2 * sites->number_count + 1, sizeof *sites->numbers, "numbers of models");
+}
+
+static void add_number(ov_reader *reader, int32_t number) {
+    ov_sites *sites = &reader->sites;
+    if (sites->numbers_status == OVOID_OK)
+        sites->numbers_status = make_room(reader);
+    if (sites->numbers_status == OVOID_OK)
+        sites->numbers[sites->number_count++] = number;
+}
+
+/* Hands the numbers over to the molecule. */
+static ovoid_status finish_numbers(ov_reader *reader) {
+    ov_sites *sites = &reader->sites;
+    if (sites->numbers_status != OVOID_OK || sites->number_count == 0)
+        return sites->numbers_status;
+    sort_numbers(sites);
+    reader->molecule->models = sites->numbers;
+    reader->molecule->model_count = sites->number_count;
+    if (sites->by_atom)
+        reader->molecule->counts.models = sites->number_count;
+    sites->numbers = NULL;
+    return OVOID_OK;
+}
+
 static void start_model(ov_reader *reader, int32_t number, bool again) {
     ov_sites *sites = &reader->sites;
     const int32_t wanted = reader->options->model;
@@ -56,6 +111,7 @@ static void start_model(ov_reader *reader, int32_t number, bool again) {
     sites->model_ended = false;
     sites->announced = OV_NO_MODEL;
     reader->molecule->counts.models++;
+    add_number(reader, number);
 }
 
 static bool count_unless_open(ov_reader *reader) {
@@ -78,6 +134,7 @@ bool ov_sites_wanted(ov_reader *reader) {
 }
 
 bool ov_sites_wanted_of(ov_reader *reader, int32_t number) {
+    reader->sites.by_atom = true;
     if (!reader->sites.model_any || number != reader->sites.model)
         start_model(reader, number, true);
     return count_unless_open(reader);
@@ -451,6 +508,9 @@ ovoid_status ov_sites_finish(ov_reader *reader) {
         if (status != OVOID_OK)
             return status;
     }
+    const ovoid_status status = finish_numbers(reader);
+    if (status != OVOID_OK)
+        return status;
     if (m->counts.models == 0)
         m->counts.models = 1;
     m->model = reader->sites.model_chosen ? reader->sites.chosen : 1;

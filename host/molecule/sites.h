@@ -47,10 +47,14 @@ typedef struct ov_sites {
     bool model_any;    /* an atom of some model was met */
     bool model_chosen; /* the wanted model was met */
     bool model_open;   /* what comes now belongs to it */
+    bool by_atom;      /* each atom names its model: those of a model need not be together */
     bool model_ended;  /* an atom that follows belongs to another model */
     int32_t announced; /* number of the model to come, OV_NO_MODEL */
     int32_t model;     /* of the current one */
     int32_t chosen, lowest, highest;
+    int32_t *numbers; /* of the models so far, owned, some of them more than once */
+    size_t number_count, number_room;
+    ovoid_status numbers_status; /* why they are not whole, all said */
 } ov_sites;
 
 enum { OV_NO_MODEL = INT32_MIN };

@@ -7,7 +7,6 @@
  * Chains have 9999 pseudo-atoms each, and begin again after 62 of them, numbers after 99999. */
 #include "write/export.h"
 
-#include "base/progress.h"
 #include "field/quadric.h"
 
 #include <math.h>
@@ -17,10 +16,11 @@
 
 enum { RESIDUES = 9999, SERIALS = 99999 };
 
-static ovoid_status write_atom(ovoid_context *context, const ov_solid *s, size_t index,
-                               FILE *stream) {
+static ovoid_status write_atom(const ov_drawn *drawn) {
     static const char chains[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789";
     static const double pi = 3.14159265358979323846;
+    const ov_solid *const s = &drawn->solid;
+    const size_t index = drawn->index;
     const int serial = (int)(index % SERIALS) + 1, residue = (int)(index % RESIDUES) + 1;
     const char chain = chains[index / RESIDUES % (sizeof chains - 1)];
     double axes[3][3], variance[3], u[6];
@@ -29,36 +29,29 @@ static ovoid_status write_atom(ovoid_context *context, const ov_solid *s, size_t
         for (int k = 0; k < 3; k++)
             axes[p][k] = s->axis[p][k];
         if (variance[p] >= 999.0 || fabs(s->centre[p]) >= 999.0)
-            return ov_fail(context, OVOID_ERROR_LIMIT,
+            return ov_fail(drawn->context, OVOID_ERROR_LIMIT,
                            "ellipsoid %zu is too large or too far from the origin for the columns "
                            "of a PDB file: write .cif",
                            index + 1);
     }
     ov_quadratic_form(axes, variance, u);
     const double b = 8.0 * pi * pi / 3.0 * (u[0] + u[3] + u[5]);
-    fprintf(stream, "HETATM%5d  C   ELL %c%4d    %8.3f%8.3f%8.3f  1.00%6.2f           C\n", serial,
-            chain, residue, s->centre[0], s->centre[1], s->centre[2], fmin(b, 999.99));
-    fprintf(stream, "ANISOU%5d  C   ELL %c%4d  %7ld%7ld%7ld%7ld%7ld%7ld       C\n", serial, chain,
-            residue, lround(1e4 * u[0]), lround(1e4 * u[3]), lround(1e4 * u[5]), lround(1e4 * u[1]),
-            lround(1e4 * u[2]), lround(1e4 * u[4]));
+    fprintf(drawn->stream, "HETATM%5d  C   ELL %c%4d    %8.3f%8.3f%8.3f  1.00%6.2f           C\n",
+            serial, chain, residue, s->centre[0], s->centre[1], s->centre[2], fmin(b, 999.99));
+    fprintf(drawn->stream, "ANISOU%5d  C   ELL %c%4d  %7ld%7ld%7ld%7ld%7ld%7ld       C\n", serial,
+            chain, residue, lround(1e4 * u[0]), lround(1e4 * u[3]), lround(1e4 * u[5]),
+            lround(1e4 * u[1]), lround(1e4 * u[2]), lround(1e4 * u[4]));
     return OVOID_OK;
 }
 
 ovoid_status ov_write_anisou(ovoid_context *context, const ovoid_model *model,
                              const ov_drawing *drawing, FILE *stream) {
-    ovoid_status status = OVOID_OK;
-    const size_t count = ovoid_model_size(model);
     fprintf(stream,
             "REMARK   3 OVOID %s: %zu ELLIPSOIDS AS PSEUDO-ATOMS. DRAWN AT A PROBABILITY\n"
             "REMARK   3 OF 50 %% THEY ARE THE ELLIPSOIDS AT ISOVALUE %.6g.\n",
-            ovoid_version(), count, drawing->isovalue);
-    for (size_t i = 0; i < count && !ferror(stream); i++) {
-        ov_solid s;
-        OV_TRY(ov_progress_turn(context, i, count));
-        ov_solid_of_ellipsoid(ovoid_model_ellipsoids(model) + i, drawing->isovalue, &s);
-        OV_TRY(write_atom(context, &s, i, stream));
-    }
-    fputs("END\n", stream);
-cleanup:
+            ovoid_version(), ovoid_model_size(model), drawing->isovalue);
+    const ovoid_status status = ov_write_each(context, model, drawing, write_atom, stream);
+    if (status == OVOID_OK)
+        fputs("END\n", stream);
     return status;
 }

@@ -2,34 +2,29 @@
  * of its own. The rotation is an axis and an angle in degrees. */
 #include "write/export.h"
 
-#include "base/progress.h"
-
 #include <math.h>
 
 static unsigned byte_of(double part) {
     return (unsigned)lround(255.0 * part);
 }
 
+static ovoid_status write_command(const ov_drawn *drawn) {
+    const ov_solid *const s = &drawn->solid;
+    const double *const colour = drawn->drawing->colour;
+    double vector[3], angle;
+    ov_solid_rotation(s, vector, &angle);
+    fprintf(drawn->stream,
+            "shape ellipsoid radius %.7g,%.7g,%.7g center %.7g,%.7g,%.7g "
+            "rotation %.7g,%.7g,%.7g,%.7g divisions 36 color #%02x%02x%02x%02x name %s_%zu\n",
+            s->semi[0], s->semi[1], s->semi[2], s->centre[0], s->centre[1], s->centre[2], vector[0],
+            vector[1], vector[2], angle, byte_of(colour[0]), byte_of(colour[1]), byte_of(colour[2]),
+            byte_of(drawn->drawing->opacity), drawn->drawing->title, drawn->index + 1);
+    return OVOID_OK;
+}
+
 ovoid_status ov_write_cxc(ovoid_context *context, const ovoid_model *model,
                           const ov_drawing *drawing, FILE *stream) {
-    ovoid_status status = OVOID_OK;
-    const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
-    const double *colour = drawing->colour;
     fprintf(stream, "# Ovoid %s, lengths in angstrom, ellipsoids at isovalue %.9g\n",
             ovoid_version(), drawing->isovalue);
-    for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
-        OV_TRY(ov_progress_turn(context, i, ovoid_model_size(model)));
-        ov_solid s;
-        double vector[3], angle;
-        ov_solid_of_ellipsoid(&ellipsoids[i], drawing->isovalue, &s);
-        ov_solid_rotation(&s, vector, &angle);
-        fprintf(stream,
-                "shape ellipsoid radius %.7g,%.7g,%.7g center %.7g,%.7g,%.7g "
-                "rotation %.7g,%.7g,%.7g,%.7g divisions 36 color #%02x%02x%02x%02x name %s_%zu\n",
-                s.semi[0], s.semi[1], s.semi[2], s.centre[0], s.centre[1], s.centre[2], vector[0],
-                vector[1], vector[2], angle, byte_of(colour[0]), byte_of(colour[1]),
-                byte_of(colour[2]), byte_of(drawing->opacity), drawing->title, i + 1);
-    }
-cleanup:
-    return status;
+    return ov_write_each(context, model, drawing, write_command, stream);
 }

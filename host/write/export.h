@@ -41,6 +41,23 @@ void ov_solid_rotation(const ov_solid *solid, double vector[3], double *angle);
 /* The same as a quaternion x, y, z, w of length 1, with w >= 0. */
 void ov_solid_quaternion(const ov_solid *solid, double q[4]);
 
+/* One of a model's ellipsoids, to be written to a stream. */
+typedef struct ov_drawn {
+    ovoid_context *context;
+    const ov_drawing *drawing;
+    const ovoid_ellipsoid *ellipsoid;
+    size_t index; /* from 0 */
+    ov_solid solid;
+    FILE *stream;
+} ov_drawn;
+
+typedef ovoid_status (*ov_drawn_writer)(const ov_drawn *drawn);
+
+/* Has each of the model's ellipsoids written, in their order, until a write fails or the context's
+ * progress callback says stop. */
+ovoid_status ov_write_each(ovoid_context *context, const ovoid_model *model,
+                           const ov_drawing *drawing, ov_drawn_writer write, FILE *stream);
+
 /* Of the Gaussian a exp(-z^T A z): its integral over all space, a sqrt(pi^3 / det A), angstrom^3;
  * and (2 A)^-1 = R^T diag(1 / (2 d)) R, as xx, xy, xz, yy, yz, zz, angstrom^2. */
 double ov_ellipsoid_integral(const ovoid_ellipsoid *ellipsoid);

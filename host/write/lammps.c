@@ -4,8 +4,6 @@
  * that masses are volumes. */
 #include "write/export.h"
 
-#include "base/progress.h"
-
 #include <math.h>
 
 static void widen(const ov_solid *s, double low[3], double high[3]) {
@@ -35,28 +33,29 @@ static void write_head(const ovoid_model *model, const ov_drawing *drawing, FILE
                 'x' + k);
 }
 
+static ovoid_status write_centre(const ov_drawn *drawn) {
+    const double *const x = drawn->solid.centre;
+    fprintf(drawn->stream, "%zu 1 1 1.0 %.10g %.10g %.10g\n", drawn->index + 1, x[0], x[1], x[2]);
+    return OVOID_OK;
+}
+
+static ovoid_status write_shape(const ov_drawn *drawn) {
+    const double *const semi = drawn->solid.semi;
+    double q[4];
+    ov_solid_quaternion(&drawn->solid, q);
+    fprintf(drawn->stream, "%zu %.8g %.8g %.8g %.9g %.9g %.9g %.9g\n", drawn->index + 1,
+            2.0 * semi[0], 2.0 * semi[1], 2.0 * semi[2], q[3], q[0], q[1], q[2]);
+    return OVOID_OK;
+}
+
 ovoid_status ov_write_lammps(ovoid_context *context, const ovoid_model *model,
                              const ov_drawing *drawing, FILE *stream) {
     ovoid_status status = OVOID_OK;
-    const size_t count = ovoid_model_size(model);
-    const ovoid_ellipsoid *const ellipsoids = ovoid_model_ellipsoids(model);
     write_head(model, drawing, stream);
     fputs("\nAtoms # ellipsoid\n\n", stream);
-    for (size_t i = 0; i < count && !ferror(stream); i++) {
-        const double *const x = ellipsoids[i].centre;
-        OV_TRY(ov_progress_turn(context, i, count));
-        fprintf(stream, "%zu 1 1 1.0 %.10g %.10g %.10g\n", i + 1, x[0], x[1], x[2]);
-    }
+    OV_TRY(ov_write_each(context, model, drawing, write_centre, stream));
     fputs("\nEllipsoids\n\n", stream);
-    for (size_t i = 0; i < count && !ferror(stream); i++) {
-        ov_solid s;
-        double q[4];
-        OV_TRY(ov_progress_turn(context, i, count));
-        ov_solid_of_ellipsoid(&ellipsoids[i], drawing->isovalue, &s);
-        ov_solid_quaternion(&s, q);
-        fprintf(stream, "%zu %.8g %.8g %.8g %.9g %.9g %.9g %.9g\n", i + 1, 2.0 * s.semi[0],
-                2.0 * s.semi[1], 2.0 * s.semi[2], q[3], q[0], q[1], q[2]);
-    }
+    OV_TRY(ov_write_each(context, model, drawing, write_shape, stream));
 cleanup:
     return status;
 }

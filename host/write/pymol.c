@@ -3,26 +3,24 @@
  * multiplies; so the size is the longest semi-axis. */
 #include "write/export.h"
 
-#include "base/progress.h"
-
 #include <math.h>
 
-static void write_ellipsoid(const ov_solid *s, FILE *stream) {
+static ovoid_status write_ellipsoid(const ov_drawn *drawn) {
+    const ov_solid *const s = &drawn->solid;
     const double size = fmax(s->semi[0], fmax(s->semi[1], s->semi[2]));
-    fprintf(stream, "    ELLIPSOID, %.7g, %.7g, %.7g, %.7g,", s->centre[0], s->centre[1],
+    fprintf(drawn->stream, "    ELLIPSOID, %.7g, %.7g, %.7g, %.7g,", s->centre[0], s->centre[1],
             s->centre[2], size);
     for (int p = 0; p < 3; p++) {
         const double length = s->semi[p] / size;
-        fprintf(stream, " %.7g, %.7g, %.7g,", length * s->axis[p][0], length * s->axis[p][1],
+        fprintf(drawn->stream, " %.7g, %.7g, %.7g,", length * s->axis[p][0], length * s->axis[p][1],
                 length * s->axis[p][2]);
     }
-    putc('\n', stream);
+    putc('\n', drawn->stream);
+    return OVOID_OK;
 }
 
 ovoid_status ov_write_pymol(ovoid_context *context, const ovoid_model *model,
                             const ov_drawing *drawing, FILE *stream) {
-    ovoid_status status = OVOID_OK;
-    const ovoid_ellipsoid *ellipsoids = ovoid_model_ellipsoids(model);
     fprintf(stream,
             "# Ovoid %s, lengths in angstrom, ellipsoids at isovalue %.9g.\n"
             "# In PyMOL: run FILE\n"
@@ -33,14 +31,10 @@ ovoid_status ov_write_pymol(ovoid_context *context, const ovoid_model *model,
             "    ALPHA, %.4g, COLOR, %.4g, %.4g, %.4g,\n",
             ovoid_version(), drawing->isovalue, drawing->opacity, drawing->colour[0],
             drawing->colour[1], drawing->colour[2]);
-    for (size_t i = 0; i < ovoid_model_size(model) && !ferror(stream); i++) {
-        OV_TRY(ov_progress_turn(context, i, ovoid_model_size(model)));
-        ov_solid s;
-        ov_solid_of_ellipsoid(&ellipsoids[i], drawing->isovalue, &s);
-        write_ellipsoid(&s, stream);
-    }
+    const ovoid_status status = ov_write_each(context, model, drawing, write_ellipsoid, stream);
+    if (status != OVOID_OK)
+        return status;
     /* The structure often has the same name, and an object of that name would be replaced. */
     fprintf(stream, "]\ncmd.load_cgo(ellipsoids, '%s_ellipsoids')\n", drawing->title);
-cleanup:
-    return status;
+    return OVOID_OK;
 }

@@ -1,3 +1,4 @@
+#include "base/progress.h"
 #include "model/ellipsoid.h"
 #include "write/export.h"
 
@@ -13,6 +14,22 @@ void ov_solid_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, double isovalue, ov
         for (int k = 0; k < 3; k++)
             solid->axis[p][k] = r[p][k] + 0.0; /* no -0, which looks odd in text */
     }
+}
+
+ovoid_status ov_write_each(ovoid_context *context, const ovoid_model *model,
+                           const ov_drawing *drawing, ov_drawn_writer write, FILE *stream) {
+    const size_t count = ovoid_model_size(model);
+    ov_drawn drawn = {.context = context, .drawing = drawing, .stream = stream};
+    ovoid_status status = OVOID_OK;
+    for (size_t i = 0; i < count && !ferror(stream) && status == OVOID_OK; i++) {
+        drawn.index = i;
+        drawn.ellipsoid = ovoid_model_ellipsoids(model) + i;
+        ov_solid_of_ellipsoid(drawn.ellipsoid, drawing->isovalue, &drawn.solid);
+        status = ov_progress_turn(context, i, count);
+        if (status == OVOID_OK)
+            status = write(&drawn);
+    }
+    return status;
 }
 
 /* Its largest part is found first: no angle is special. */

@@ -120,6 +120,11 @@ OVOID_API const char *ovoid_radii_name(ovoid_radii radii);
 /* Number in the file of the model that was read; 1 where it does not tell models apart. */
 OVOID_API int32_t ovoid_molecule_model(const ovoid_molecule *molecule);
 
+/* The numbers of all models in the file, *count of them, ascending and each once: fewer than
+ * counts.models where two models share a number, of which reading takes the first. 1 alone where
+ * the file does not tell models apart. More than a million are OVOID_ERROR_LIMIT when read. */
+OVOID_API const int32_t *ovoid_molecule_models(const ovoid_molecule *molecule, size_t *count);
+
 /* ---- which atom is which -------------------------------------------------------------------- */
 
 /* The structures below never change, and are to be mapped by bindings as they are. Text ends

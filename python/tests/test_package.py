@@ -3,6 +3,8 @@
 import base64
 import gc
 import html
+import inspect
+import json
 import os
 import pathlib
 import pickle
@@ -212,6 +214,49 @@ def test_pictures(peptide, model, tmp_path):
     assert image._repr_png_().startswith(b"\x89PNG")
 
 
+def test_pictures_of_two_are_the_same_from_either(peptide, model):
+    how = {"view": "difference", "size": (80, 60), "samples": 1}
+    pictures = [model.render(peptide, **how), peptide.render(model, **how)]
+    assert np.array_equal(pictures[0].pixels, pictures[1].pixels)
+    alone = peptide.render(size=(80, 60), samples=1).pixels
+    assert not np.array_equal(alone, model.render(size=(80, 60), samples=1).pixels)
+    with pytest.raises(ovoid.ArgumentError, match="not a Model and a Model"):
+        model.render(model)
+    with pytest.raises(ovoid.ArgumentError, match="its own decay"):
+        model.render(peptide, decay=0.4)
+
+
+def test_surfaces_are_meshed_alike(peptide, model):
+    for thing in (peptide, model):
+        same = [thing.mesh(1.0), thing.field().mesh(1.0), ovoid.Field(thing).field().mesh(1.0)]
+        for mesh in same[1:]:
+            assert np.array_equal(same[0].vertices, mesh.vertices)
+        assert thing.mesh(1.0, isovalue=2.0).area < same[0].area
+    with pytest.raises(ovoid.ArgumentError, match="a model has its own decay"):
+        model.mesh(decay=0.4)
+    with pytest.raises(ovoid.ArgumentError, match="a field has its own decay"):
+        model.field().mesh(decay=0.4)
+    with pytest.raises(ovoid.ArgumentError, match="the context that it was made with"):
+        model.field().mesh(context=ovoid.Context())
+
+
+def test_options_of_fits_have_names(peptide):
+    shown = inspect.signature(ovoid.Molecule.fit).parameters
+    assert shown["method"].default == "adaptive" and shown["decay"].default is None
+    assert inspect.signature(ovoid.Fitter).parameters.keys() - {"molecule"} < shown.keys()
+    text = ovoid.Molecule.fit.__doc__
+    for name in shown.keys() - {"self"}:
+        assert re.search(rf"^        [\w, ]*\b{name}\b[\w, ]* : ", text, re.M), name
+    for function, wrong in (
+        (peptide.fit, "spacng"),
+        (ovoid.Fitter(peptide).fit, "decay"),
+        (lambda **options: ovoid.Fitter(peptide, **options), "effort"),
+        (lambda **options: ovoid.fit_trajectory([peptide.xyz], peptide, **options), "steps"),
+    ):
+        with pytest.raises(TypeError, match=f"unexpected keyword argument '{wrong}'"):
+            function(**{wrong: 1})
+
+
 def test_a_page_in_a_notebook(peptide, model, tmp_path):
     shown = model._repr_mimebundle_()
     assert shown["text/plain"] == repr(model) and shown["text/html"].startswith("<iframe srcdoc=")
@@ -241,3 +286,46 @@ def test_fitter(peptide):
         [10, 0, 0], abs=0.2
     )
     assert np.array_equal(moved.owner, fine.owner)
+
+
+def test_selftest(monkeypatch):
+    """As the tool has it; what is wrong is told, and no error."""
+    told = []
+    found = ovoid.selftest(brief=True, progress=told.append)
+    command = [os.environ.get("OVOID_TOOL", "ovoid"), "selftest", "--short", "--json"]
+    tool = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    assert found.passed and told
+    assert [c.name for c in found.checks] == [c["name"] for c in tool["checks"]]
+    for check, theirs in zip(found.checks, tool["checks"]):
+        assert check.kernels == tuple(theirs["kernels"].split()) and check.text == ""
+        assert check.numbers == theirs["numbers"] and 0 <= check.error <= 1
+    assert found.device == ovoid.use_device(None) and found.round_trip_seconds > 0
+    assert len(str(found).splitlines()) == len(found.checks) + 2 and "0 wrong" in repr(found)
+
+    def wrong(handle, options, told, user, result):
+        for verdict in range(3):
+            raw = _abi.Check(name=b"lists", kernels=b"a b", verdict=verdict, text=b"off")
+            told(_abi.ctypes.addressof(raw), None)
+        return 0
+
+    monkeypatch.setattr(_abi.lib, "selftest", wrong)
+    found = ovoid.selftest()
+    assert [c.verdict for c in found.checks] == ["passed", "wrong", "failed"]
+    assert not found.passed and "1 wrong, 1 failed" in repr(found) and "    off" in str(found)
+
+
+def test_selftest_can_be_stopped():
+    with pytest.raises(ovoid.Cancelled):
+        ovoid.selftest(progress=lambda _: False)
+    assert ovoid.selftest(brief=True).passed
+
+
+def test_parts(peptide):
+    """However many are fitted side by side, the model is the same."""
+    alone = peptide.fit(ratio=0.2, part_atoms=64)
+    assert alone.report.parts > 1 and "parts " in alone.notes["settings"]
+    beside = peptide.fit(ratio=0.2, part_atoms=64, jobs=2)
+    assert np.array_equal(alone.ellipsoids, beside.ellipsoids)
+    assert peptide.fit(ratio=0.2).report.parts == 1
+    with pytest.raises(ovoid.ArgumentError, match="parts.atoms"):
+        peptide.fit(part_atoms=3)

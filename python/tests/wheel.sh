@@ -1,7 +1,7 @@
 #!/bin/sh
 # wheel.sh PYTHON REPOSITORY BUILD
-# What pip makes of the sources, in an environment of its own: builds the wheel in BUILD, which is kept,
-# so that only what changed is compiled again, and does what a newcomer does first: read, fit, measure.
+# What pip makes of a source distribution, in an environment of its own: builds the wheel in BUILD, which is
+# kept, so that only what changed is compiled again, and does what a newcomer does first: read, fit, measure.
 # Skipped (77) where there is no venv, or pip cannot reach a registry.
 set -eu
 python=$1
@@ -22,7 +22,25 @@ $pip install scikit-build-core numpy 2>"$work/error" || {
     echo "skipped: pip cannot install scikit-build-core and numpy"
     exit 77
 }
-$pip wheel --no-deps --no-build-isolation -w "$work" --config-settings=build-dir="$build" "$repository/python"
+# Both folders are the package, and what is built is what a source distribution holds.
+for folder in "$repository" "$repository/python"; do
+    $pip install --dry-run --no-deps --no-build-isolation --report "$work/report" "$folder"
+    grep -q '"name": "ovoid"' "$work/report" || { echo "$folder is no package"; exit 1; }
+done
+(cd "$repository" && "$work/env/bin/python" -c '
+import sys
+from scikit_build_core.build import build_sdist
+build_sdist(sys.argv[1])' "$work") >/dev/null
+mkdir -p "$work/sources" "$build/sources"
+tar -xzf "$work"/ovoid-*.tar.gz -C "$work/sources" --strip-components 1
+rm "$work"/ovoid-*.tar.gz
+(cd "$work/sources" && find . -type f) | while read -r file; do # their dates do not tell what changed
+    cmp -s "$work/sources/$file" "$build/sources/$file" && continue
+    mkdir -p "$(dirname "$build/sources/$file")"
+    cp "$work/sources/$file" "$build/sources/$file"
+    touch "$build/sources/$file"
+done
+$pip wheel --no-deps --no-build-isolation -w "$work" --config-settings=build-dir="$build/build" "$build/sources"
 wheel=$(echo "$work"/ovoid-*-py3-none-*.whl)
 [ -e "$wheel" ] || { echo "there is no wheel for all versions of Python: $(ls "$work")"; exit 1; }
 $pip install "$wheel"

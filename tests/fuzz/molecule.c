@@ -63,6 +63,19 @@ static void check_counts(const ovoid_molecule *m) {
     fuzz_require(guessed <= c.guessed_radii, "guesses are counted once");
 }
 
+static void check_models(const ovoid_molecule *m) {
+    size_t count;
+    bool own = false;
+    const int32_t *models = ovoid_molecule_models(m, &count);
+    fuzz_require(count > 0 && count <= ovoid_molecule_read_counts(m)->models,
+                 "there are as many models as numbers, or more");
+    for (size_t i = 0; i < count; i++) {
+        fuzz_require(i == 0 || models[i - 1] < models[i], "numbers of models ascend");
+        own = own || models[i] == ovoid_molecule_model(m);
+    }
+    fuzz_require(own, "the model that was read is one of them");
+}
+
 static void check_placements(const ovoid_molecule *m) {
     size_t count, part_atoms, placement;
     uint64_t total = 0;
@@ -95,6 +108,7 @@ ovoid_molecule *fuzz_read(const char *path, const ovoid_read_options *options) {
     check_places(ovoid_molecule_unit_xyzr(m), ovoid_molecule_unit_atoms(m));
     check_identity(m);
     check_counts(m);
+    check_models(m);
     check_placements(m);
     if (ovoid_molecule_atoms(m) <= EXPANDED_MAX)
         check_places(ovoid_molecule_xyzr(m), ovoid_molecule_atoms(m));

@@ -156,6 +156,86 @@ def check_picking(b, page):
     b.key("Escape")
 
 
+def difference_at(b, x, y):
+    """What the page says of the place that is seen there, Å; None where it says nothing."""
+    b.mouse("mouseMoved", x, y)
+    b.settle()
+    text = card(b)
+    if not text:
+        return None
+    value = float(text.split(" Å")[0].removeprefix("more than ").replace("−", "-"))
+    said = "meet here" if value == 0 else "outside here" if value > 0 else "inside here"
+    assert said in text, text
+    return value
+
+
+def check_places(b, page):
+    """Pointed at, a place of the difference tells how far it is off: what its colour says."""
+    b.key("r")
+    b.key("4")
+    shown(b, "difference")
+    b.mouse("mouseMoved", 3, 180)
+    b.settle()
+    assert card(b) == "" and b.ask("document.getElementById('mark').hidden")
+    plain = b.screenshot()
+    points = [p for p in drawn(plain) if p[0] > 10]
+    values, hues, limit = [], [], page.scene["range"]
+    for k in range(60):
+        x, y = points[k * (len(points) - 1) // 59]
+        value = difference_at(b, x, y)
+        if value is None:  # between two pieces
+            continue
+        at = 3 * (y * plain[0] + x)
+        red, green, blue = plain[2][at:at + 3]
+        assert abs(value) <= limit + 0.005
+        values.append(value)
+        hues.append((red - blue) / (red + green + blue))
+    assert len(values) > 50 and min(values) < -0.2 * limit and max(values) > 0.2 * limit, values
+    assert correlation(values, hues) > 0.93, correlation(values, hues)
+    left = float(b.ask("document.getElementById('mark').style.left").rstrip("%"))
+    assert abs(left - 50 - 50 * values[-1] / limit) < 2
+    check_kept_place(b, points[0])
+
+
+def correlation(a, b):
+    n, mean_a, mean_b = len(a), sum(a) / len(a), sum(b) / len(b)
+    spread = [sum((v - m) ** 2 for v in c) for c, m in ((a, mean_a), (b, mean_b))]
+    return sum((a[i] - mean_a) * (b[i] - mean_b) for i in range(n)) / (spread[0] * spread[1]) ** 0.5
+
+
+def dot(b):
+    return b.ask("""(() => { const d = document.getElementById('dot');
+        return d.hidden ? null : [parseFloat(d.style.left), parseFloat(d.style.top)]; })()""")
+
+
+def check_kept_place(b, at):
+    """A click keeps a place; its dot goes along with it as the molecule is turned."""
+    value = difference_at(b, *at)
+    b.click(*at)
+    b.settle()
+    first = dot(b)
+    assert abs(first[0] - at[0]) < 1.5 and abs(first[1] - at[1]) < 1.5, (first, at)
+    b.mouse("mouseMoved", 3, 180)
+    b.settle()
+    kept = card(b)
+    assert kept, "a click keeps it"
+    b.key("ArrowRight")
+    b.settle()
+    second = dot(b)
+    assert second is None or abs(second[0] - first[0]) > 2, "it moves"
+    if second:
+        assert abs(difference_at(b, *second) - value) < 0.03, "and is the same place"
+    for _ in range(24):  # to the other side
+        b.key("ArrowRight")
+    b.settle()
+    assert dot(b) is None
+    b.key("Escape")
+    b.mouse("mouseMoved", 3, 180)
+    b.settle()
+    assert card(b) == ""
+    b.key("r")
+
+
 def check_levels(b):
     b.key("2")
     shown(b, "model")
@@ -221,6 +301,7 @@ with tempfile.TemporaryDirectory() as folder:
         shown(b, "molecule")
         check_turning(b, pictures["molecule"])
         check_picking(b, page)
+        check_places(b, page)
         check_levels(b)
         assert b.complaints() == [], b.complaints()
         check_phone(b, path)

@@ -1,7 +1,7 @@
 #!/bin/sh
 # report_keys.sh OVOID
 # The guide explains every key of the reports, and no other: those of fits by both methods, with an
-# assembly, levels and all options that add some, of several molecules, and of `ovoid measure`.
+# assembly, levels and all options that add some, of several molecules, of all models of a file, and of `ovoid measure`.
 set -u
 ovoid=$1
 guide=docs/guide.md
@@ -27,6 +27,7 @@ fit() {
 fit --ratio 1 --levels 2 --time-limit 1e6 --profile --assembly 1 --owners "$work/o.csv" --report "$work/1.json"
 fit --method l1 --iterations 20 --radii "$work/radii" --report "$work/2.json"
 "$ovoid" measure "$work/a.pdb" "$work/a.ovoid" -q --report "$work/3.json" || exit 1
+"$ovoid" fit "$work/a.pdb" --models all --ratio 1 -o "$work/m.ovoid" -q --report "$work/5.json" || exit 1
 "$ovoid" fit "$work/a.pdb" "$work/none.pdb" --ellipsoids 1 --out-dir "$work" --report "$work/4.json" -q 2>/dev/null
 
 # Options of the methods are those of the help, with underscores.

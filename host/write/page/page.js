@@ -243,7 +243,7 @@ function surfaceOf(level, detail) {
         attribute(1, 2, gl.SHORT, 4, 0);
         buffer(gl.ELEMENT_ARRAY_BUFFER, data.corners);
         gl.bindVertexArray(null);
-        return { array, count: data.corners.length, box: [...s.low, s.step], at: data.at };
+        return { array, count: data.corners.length, box: [...s.low, s.step], at: data.at, corners: data.corners };
     });
 }
 
@@ -251,7 +251,7 @@ function differenceOf(surface, of, level, detail) {
     const d = scene.differences.find((x) => x.of === of && x.level === level && x.detail === detail);
     return d && once(d.id, async () => {
         const values = await readScalars(d);
-        return { buffer: buffer(gl.ARRAY_BUFFER, values), largest: d.largest };
+        return { buffer: buffer(gl.ARRAY_BUFFER, values), largest: d.largest, values };
     });
 }
 
@@ -378,6 +378,7 @@ function matrices() {
             moved[0] + camera.shift[0], moved[1] + camera.shift[1], moved[2] - d, 1],
         projection: [f / a, 0, 0, 0, 0, f, 0, 0, 0, 0, (near + far) / (near - far), -1,
             0, 0, 2 * near * far / (near - far), 0],
+        near,
         fade: [d - 0.2 * scene.radius, 1.2 * scene.radius]
     };
 }
@@ -446,7 +447,9 @@ const VIEWS = [
 ];
 const COLOURS = { molecule: [0.86, 0.42, 0.12], model: [0.10, 0.32, 0.66] }; /* linear light */
 const state = { view: both ? 'both' : scene.levels.length ? 'model' : 'molecule', level: 0, detail: 0,
-    pointed: -1, picked: -1, dark: matchMedia('(prefers-color-scheme: dark)').matches };
+    pointed: -1, picked: -1, /* ellipsoids */
+    place: null, kept: null, /* of the difference: pointed at, and picked */
+    dark: matchMedia('(prefers-color-scheme: dark)').matches };
 let shown = null; /* buffers of what is on the canvas, replaced as a whole when they are there */
 let asked = 0;
 
@@ -551,6 +554,7 @@ function paint() {
         drawGlass(m, shown.molecule, COLOURS.molecule);
     }
     showScale();
+    showDot(m);
 }
 
 let waiting = false;
@@ -562,6 +566,24 @@ function draw() {
         waiting = false;
         paint();
     });
+}
+
+/* A place that was picked goes along with the molecule, unless it is turned away. */
+function showDot(m) {
+    const dot = byId('dot'), kept = shown.view === 'difference' && state.kept;
+    dot.hidden = true;
+    if (!kept)
+        return;
+    const eye = [0, 1, 2].map((k) => m.view[k] * kept.at[0] + m.view[4 + k] * kept.at[1] +
+        m.view[8 + k] * kept.at[2] + m.view[12 + k]);
+    const n = [0, 1, 2].map((k) => m.view[k] * kept.normal[0] + m.view[4 + k] * kept.normal[1] +
+        m.view[8 + k] * kept.normal[2]);
+    if (-eye[2] < m.near || n[0] * eye[0] + n[1] * eye[1] + n[2] * eye[2] > 0)
+        return;
+    const pixels = canvas.clientHeight / (2 * Math.tan(FIELD / 2) * -eye[2]);
+    dot.hidden = false;
+    dot.style.left = canvas.clientWidth / 2 + eye[0] * pixels + 'px';
+    dot.style.top = canvas.clientHeight / 2 - eye[1] * pixels + 'px';
 }
 
 /* ---- text ------------------------------------------------------------------------------------ */
@@ -611,7 +633,32 @@ function shorten(text) {
     return parts.slice(0, 2 * left - 1).join('') + ' and ' + ((parts.length + 1) / 2 - left) + ' more';
 }
 
+/* What was pointed at or picked. */
 function tellChosen() {
+    if (!shown)
+        return;
+    const place = shown.view === 'difference' ? state.place || state.kept : null;
+    byId('mark').hidden = !place;
+    if (place)
+        tellPlace(place);
+    else
+        tellEllipsoid();
+}
+
+/* Colours end at the range: beyond it a place is known to be beyond, and no more. */
+function tellPlace({ value, beyond }) {
+    const heading = document.createElement('h2'), text = document.createElement('p');
+    const digits = scene.range < 0.1 ? 4 : 2, flat = Number(Math.abs(value).toFixed(digits)) === 0;
+    heading.textContent = (beyond ? 'more than ' : '') + (value > 0 && !flat ? '+' : '') +
+        format(flat ? 0 : value, digits) + ' Å';
+    text.textContent = flat ? 'the surfaces meet here'
+        : 'the model’s surface lies ' + (value > 0 ? 'outside' : 'inside') + ' here';
+    byId('mark').style.left = 50 + 50 * value / scene.range + '%';
+    byId('card').replaceChildren(heading, text);
+    byId('card').hidden = false;
+}
+
+function tellEllipsoid() {
     const card = byId('card'), i = state.pointed >= 0 ? state.pointed : state.picked;
     card.hidden = i < 0 || !shown.ellipsoids || shown.view !== 'ellipsoids';
     if (card.hidden)
@@ -636,15 +683,80 @@ function tellChosen() {
 
 /* ---- pointing ---------------------------------------------------------------------------------- */
 
+/* Of a point of the canvas: x / -z and y / -z of what is seen there, in front of the eye. */
+function slopes(x, y) {
+    const h = Math.tan(FIELD / 2);
+    return [(2 * x / canvas.clientWidth - 1) * h * aspect(), (1 - 2 * y / canvas.clientHeight) * h];
+}
+
+/* Of each vertex x / -z and y / -z, counted from a point of the canvas, and 1 / -z. Behind the eye
+ * they are no numbers, and no triangle with such a corner is met. */
+function project(surface, view, [px, py]) {
+    const { at, box } = surface, v = view, n = at.length / 4;
+    const seen = surface.seen = surface.seen || new Float32Array(3 * n);
+    for (let i = 0; i < n; i++) {
+        const a = box[0] + box[3] * at[4 * i], b = box[1] + box[3] * at[4 * i + 1];
+        const c = box[2] + box[3] * at[4 * i + 2];
+        const z = -(v[2] * a + v[6] * b + v[10] * c + v[14]), w = z > 0 ? 1 / z : NaN;
+        seen[3 * i] = (v[0] * a + v[4] * b + v[8] * c + v[12]) * w - px;
+        seen[3 * i + 1] = (v[1] * a + v[5] * b + v[9] * c + v[13]) * w - py;
+        seen[3 * i + 2] = w;
+    }
+    return seen;
+}
+
+/* The nearest triangle about 0, 0 of what project() made, and the share of each corner there. */
+function triangleAt(corners, seen, nearest) {
+    let best = 0, found = null;
+    for (let t = 0; t < corners.length; t += 3) {
+        const i = 3 * corners[t], j = 3 * corners[t + 1], k = 3 * corners[t + 2];
+        const x0 = seen[i], x1 = seen[j], x2 = seen[k], y0 = seen[i + 1], y1 = seen[j + 1], y2 = seen[k + 1];
+        if (x0 > 0 && x1 > 0 && x2 > 0 || x0 < 0 && x1 < 0 && x2 < 0 ||
+            y0 > 0 && y1 > 0 && y2 > 0 || y0 < 0 && y1 < 0 && y2 < 0)
+            continue;
+        const a = x1 * y2 - x2 * y1, b = x2 * y0 - x0 * y2, c = x0 * y1 - x1 * y0, sum = a + b + c;
+        if (!(a >= 0 && b >= 0 && c >= 0 || a <= 0 && b <= 0 && c <= 0) || sum === 0)
+            continue;
+        const shares = [a * seen[i + 2] / sum, b * seen[j + 2] / sum, c * seen[k + 2] / sum];
+        const w = shares[0] + shares[1] + shares[2];
+        if (w > best && w * nearest < 1) {
+            best = w;
+            found = { t, shares: shares.map((s) => s / w) };
+        }
+    }
+    return found;
+}
+
+/* The place of the difference that is seen at a point of the canvas, null for none: where it is, which
+ * way is out, and the difference there (Å). */
+function placeAt(x, y) {
+    if (!shown || shown.view !== 'difference')
+        return null;
+    const surface = shown.molecule, { at, box, corners } = surface, m = matrices();
+    const hit = triangleAt(corners, project(surface, m.view, slopes(x, y)), m.near);
+    if (!hit)
+        return null;
+    const three = [0, 1, 2].map((c) => corners[hit.t + c]);
+    const p = three.map((i) => [0, 1, 2].map((k) => box[k] + box[3] * at[4 * i + k]));
+    const mixed = (values) => values.reduce((sum, v, c) => sum + hit.shares[c] * v, 0);
+    const values = three.map((i) => shown.difference.values[i]);
+    const [u, v] = [1, 2].map((c) => p[c].map((q, k) => q - p[0][k]));
+    return {
+        at: [0, 1, 2].map((k) => mixed(p.map((q) => q[k]))),
+        normal: [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]],
+        value: mixed(values) / 127 * scene.range,
+        beyond: Math.abs(mixed(values)) > 126.5
+    };
+}
+
 /* The ellipsoid that the line of sight through a point of the canvas meets first, -1 for none: in
  * the frame where an ellipsoid is the unit sphere, the nearer solution of |o + t d| = 1. */
 function ellipsoidAt(x, y) {
     const e = shown && shown.view === 'ellipsoids' && shown.ellipsoids;
     if (!e)
         return -1;
-    const r = rotation(camera.turn), h = Math.tan(FIELD / 2), d = distance();
-    const eye = [-camera.shift[0], -camera.shift[1], d];
-    const ray = [(2 * x / canvas.clientWidth - 1) * h * aspect(), (1 - 2 * y / canvas.clientHeight) * h, -1];
+    const r = rotation(camera.turn);
+    const eye = [-camera.shift[0], -camera.shift[1], distance()], ray = [...slopes(x, y), -1];
     const back = (v) => [0, 1, 2].map((k) => r[3 * k] * v[0] + r[3 * k + 1] * v[1] + r[3 * k + 2] * v[2]);
     const from = back(eye).map((v, k) => v + scene.centre[k] - scene.origin[k]), along = back(ray);
     let best = -1, nearest = Infinity;
@@ -678,11 +790,28 @@ function point(i) {
     draw();
 }
 
-function pick(i) {
+function pick(i, place = null) {
     state.picked = i;
     state.pointed = -1;
+    state.kept = place;
+    state.place = null;
     tellChosen();
     draw();
+}
+
+/* Looking for a place of the difference goes through all triangles: once a frame is enough. */
+let looking = null; /* where the pointer is, while a frame is waited for */
+function look(x, y) {
+    point(ellipsoidAt(x, y));
+    if (!shown || shown.view !== 'difference')
+        return;
+    if (!looking)
+        requestAnimationFrame(() => {
+            state.place = looking && placeAt(...looking);
+            looking = null;
+            tellChosen();
+        });
+    looking = [x, y];
 }
 
 const fingers = new Map();
@@ -716,7 +845,7 @@ canvas.addEventListener('pointermove', (event) => {
     const before = fingers.get(event.pointerId), x = event.clientX, y = event.clientY;
     if (!before) {
         if (event.pointerType !== 'touch')
-            point(ellipsoidAt(x, y));
+            look(x, y);
         return;
     }
     const dx = x - before[0], dy = y - before[1], speed = 5 / Math.min(canvas.clientWidth, canvas.clientHeight);
@@ -734,9 +863,13 @@ for (const name of ['pointerup', 'pointercancel'])
     canvas.addEventListener(name, (event) => {
         fingers.delete(event.pointerId);
         if (name === 'pointerup' && moved < 4)
-            pick(ellipsoidAt(event.clientX, event.clientY));
+            pick(ellipsoidAt(event.clientX, event.clientY), placeAt(event.clientX, event.clientY));
     });
-canvas.addEventListener('pointerleave', () => point(-1));
+canvas.addEventListener('pointerleave', () => {
+    point(-1);
+    state.place = looking = null;
+    tellChosen();
+});
 canvas.addEventListener('contextmenu', (event) => event.preventDefault());
 canvas.addEventListener('wheel', (event) => {
     event.preventDefault();
@@ -751,6 +884,7 @@ function setView(name) {
         return;
     state.view = name;
     state.pointed = -1;
+    state.place = state.kept = null;
     show();
 }
 
@@ -759,11 +893,13 @@ function setLevel(level) {
         return;
     state.level = level;
     state.picked = state.pointed = -1;
+    state.place = state.kept = null;
     show();
 }
 
 function setDetail(detail) {
     state.detail = detail;
+    state.place = state.kept = null;
     show();
 }
 

@@ -20,6 +20,7 @@ from ._molecule import Assembly, Molecule, read
 from ._objects import from_arrays, molecule
 from ._picture import Image
 from ._scene import Scene
+from ._selftest import Check, SelfTest, selftest
 from ._trajectory import FitTrajectory, SurfaceTrajectory, fit_trajectory, measure_trajectory
 from .errors import (
     ArgumentError,
@@ -45,6 +46,7 @@ __all__ = [
     "ArgumentError",
     "Assembly",
     "Cancelled",
+    "Check",
     "Component",
     "Context",
     "Device",
@@ -74,6 +76,7 @@ __all__ = [
     "Pair",
     "Progress",
     "Scene",
+    "SelfTest",
     "SurfaceTrajectory",
     "devices",
     "fit_trajectory",
@@ -82,5 +85,6 @@ __all__ = [
     "molecule",
     "read",
     "read_model",
+    "selftest",
     "use_device",
 ]

@@ -145,6 +145,11 @@ AdaptiveOptions = _structure(
     ("steps", c_uint32),
     ("mesh_spacing", c_double),
 )
+PartsOptions = _structure(
+    "ovoid_parts_options",
+    *((name, c_uint32) for name in ("atoms", "jobs", "resume")),
+    ("checkpoint", c_char_p),
+)
 FitOptions = _structure(
     "ovoid_fit_options",
     ("size", c_size_t),
@@ -155,6 +160,7 @@ FitOptions = _structure(
     ("padding", c_double),
     ("adaptive", AdaptiveOptions),
     ("l1", L1Options),
+    ("parts", PartsOptions),
 )
 L1Result = _structure(
     "ovoid_l1_result",
@@ -179,6 +185,7 @@ FitResult = _structure(
     ("l1", L1Result),
     ("adaptive", AdaptiveResult),
     ("counts", c_uint64 * COUNTS),
+    ("parts", c_uint64),
 )
 MeshOptions = _structure(
     "ovoid_mesh_options",
@@ -264,15 +271,37 @@ PictureOptions = _structure(
     ("range", c_double),
 )
 
+Check = _structure(
+    "ovoid_check",
+    ("size", c_size_t),
+    ("name", c_char_p),
+    ("kernels", c_char_p),
+    ("verdict", c_int),
+    ("seconds", c_double),
+    ("compared", c_uint64),
+    ("error", c_double),
+    ("text", c_char_p),
+)
+SelfTestOptions = _structure("ovoid_selftest_options", ("size", c_size_t), ("brief", c_bool))
+SelfTestResult = _structure(
+    "ovoid_selftest_result",
+    ("size", c_size_t),
+    *((name, c_uint32) for name in ("passed", "wrong", "failed")),
+    *((name, c_uint32) for name in ("vector", "lanes", "team", "solve_group")),
+    *((name, c_double) for name in ("launch_seconds", "round_trip_seconds")),
+    *((name, c_double) for name in ("to_device_bytes", "from_device_bytes")),
+)
+
 ProgressFunction = CFUNCTYPE(c_bool, c_void_p, c_void_p)
 WarningFunction = CFUNCTYPE(None, c_char_p, c_void_p)
+CheckFunction = CFUNCTYPE(None, c_void_p, c_void_p)
 
 STRUCTURES = [
     *(L1Progress, AdaptiveProgress, Progress, DeviceInfo, ReadOptions, MoleculeCounts),
-    *(AssemblyInfo, L1Options, AdaptiveOptions, FitOptions, L1Result, AdaptiveResult, FitResult),
+    *(AssemblyInfo, L1Options, AdaptiveOptions, PartsOptions, FitOptions),
+    *(L1Result, AdaptiveResult, FitResult),
     *(MeshOptions, Component, Distances, Pair, MeasureOptions, Measures, ExportOptions),
-    PictureOptions,
-    Scene,
+    *(PictureOptions, Scene, Check, SelfTestOptions, SelfTestResult),
 ]
 
 # Arrays of these are mapped by numpy, with these sizes in bytes.
@@ -303,6 +332,12 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "devices": (c_int, [_P, c_size_t, POINTER(_P), _SIZE]),
     "context_open_device": (c_int, [_P, c_char_p]),
     "context_device": (POINTER(DeviceInfo), [_P]),
+    "selftest": (
+        c_int,
+        [_P, POINTER(SelfTestOptions), CheckFunction, _P, POINTER(SelfTestResult)],
+    ),
+    "selftest_options_init": (None, [POINTER(SelfTestOptions), c_size_t]),
+    "selftest_result_init": (None, [POINTER(SelfTestResult), c_size_t]),
     "free": (None, [_P]),
     "molecule_read_with": (c_int, [_P, c_char_p, POINTER(ReadOptions), POINTER(_P)]),
     "molecule_create": (c_int, [_P, _P, c_size_t, POINTER(_P)]),

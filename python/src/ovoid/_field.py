@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-import os
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _abi
 from ._abi import lib
-from ._context import Context, Handle, ProgressLike, default_context, encode
-from ._mesh import Mesh, mesh_field
+from ._context import Context, Handle, default_context
+from ._surface import DECAY, ISOVALUE, Surface
 from ._views import Doubles, doubles
 from .errors import ArgumentError
 
@@ -20,12 +18,8 @@ if TYPE_CHECKING:
     from ._model import Model
     from ._molecule import Molecule
 
-DECAY = 0.5
-ISOVALUE = 1.0
-SPACING = 0.5
 
-
-class Field:
+class Field(Surface):
     """The field φ of a molecule or a model. It keeps its Gaussians on the device.
 
     Parameters
@@ -71,6 +65,20 @@ class Field:
             raise TypeError(f"a field is one of a Molecule or a Model, not {type(source).__name__}")
         assert made.value
         self._handle = Handle(made.value, lib.field_destroy, self.context)
+
+    def field(
+        self,
+        decay: float | None = None,
+        isovalue: float | None = None,
+        *,
+        context: Context | None = None,
+    ) -> Field:
+        """Itself."""
+        if decay is not None or isovalue is not None:
+            raise ArgumentError("a field has its own decay and isovalue")
+        if context is not None and context is not self.context:
+            raise ArgumentError("a field belongs to the context that it was made with")
+        return self
 
     @property
     def _pointer(self) -> ctypes.c_void_p:
@@ -138,92 +146,3 @@ class Field:
         if slope is None:
             return value.reshape(shape)
         return value.reshape(shape), slope.reshape((*shape, 3))
-
-    def mesh(
-        self,
-        spacing: float = SPACING,
-        isovalue: float | None = None,
-        *,
-        vertices: str = "exact",
-        progress: ProgressLike = False,
-    ) -> Mesh:
-        """The closed triangle mesh of the surface φ = c, by marching cubes on the device.
-
-        Parameters
-        ----------
-        spacing : float
-            Of the lattice (Å).
-        isovalue : float, optional
-            c; default: the field's.
-        vertices : {"exact", "linear"}
-            On the surface itself, or interpolated along the lattice's edges.
-        progress : bool or callable
-            See `Molecule.fit`.
-
-        Returns
-        -------
-        Mesh
-        """
-        return mesh_field(self, spacing, isovalue, vertices, progress)
-
-    def export(
-        self,
-        path: str | os.PathLike[str],
-        *,
-        format: str | None = None,
-        isovalue: float | None = None,
-        spacing: float | None = None,
-        colour: tuple[float, float, float] | None = None,
-        opacity: float | None = None,
-        max_gigabytes: float | None = None,
-        progress: ProgressLike = False,
-    ) -> None:
-        """Writes a file for another program, whole or not at all.
-
-        Parameters
-        ----------
-        path : path-like
-            Its extension is the format: of a model .bild, .cxc (ChimeraX), .py (PyMOL), .gmm,
-            .json, .xyz (OVITO), .lmp (LAMMPS), .pdb (ANISOU), .gltf (splats); of models and
-            molecules maps, .mrc, .map, .ccp4 and .dx. `Scene.export` has more.
-        format : str, optional
-            The name of the format, where the extension does not tell.
-        isovalue : float, optional
-            Where an ellipsoid is drawn; default: the model's.
-        spacing : float, optional
-            Of a map (Å).
-        colour : (red, green, blue), optional
-            From 0 to 1, of drawn ellipsoids.
-        opacity : float, optional
-            From 0 to 1, of drawn ellipsoids.
-        max_gigabytes : float, optional
-            A map that would take more is refused.
-        progress : bool or callable
-            See `Molecule.fit`.
-        """
-        options = export_options(
-            format,
-            isovalue=isovalue,
-            spacing=spacing,
-            colour=colour,
-            opacity=opacity,
-            max_gigabytes=max_gigabytes,
-        )
-        with self.context._watching(progress):
-            self.context._call(lib.field_export, self._pointer, encode(path), ctypes.byref(options))
-
-
-def export_options(
-    format: str | None,
-    *,
-    colour: tuple[float, float, float] | None = None,
-    **values: float | None,
-) -> Any:
-    """The library's structure; None leaves what is the default there."""
-    kind = 0
-    if format is not None:
-        kind = lib.export_format_find(format.encode())
-        if kind == 0:
-            raise ArgumentError(f"there is no format {format!r}")
-    vector = None if colour is None else (ctypes.c_double * 3)(*colour)
-    return _abi.filled(_abi.ExportOptions, format=kind, colour=vector, **values)

@@ -13,11 +13,14 @@ import numpy.typing as npt
 
 from . import _abi
 from ._abi import UNKNOWN, lib
-from ._context import Context, Handle, ProgressLike, _outside, default_context
+from ._context import Context, Handle, _outside, default_context
+from ._options import SearchOptions, SurfaceOptions, spelled_out
 from ._views import doubles
 from .errors import ArgumentError, Cancelled, GoalWarning, Interrupted
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from ._model import Model
     from ._molecule import Molecule
 
@@ -58,6 +61,8 @@ class FitReport:
     spacing : float
         Of the constrained points (Å).
     points, iterations : int
+    parts : int
+        That the molecule was cut into; 1 as a whole.
     sample_seconds, fit_seconds : float
     rms_error, max_error : float
         Of method l1, of the field at the constrained points; else NaN.
@@ -74,6 +79,7 @@ class FitReport:
     spacing: float
     points: int
     iterations: int
+    parts: int
     sample_seconds: float
     fit_seconds: float
     rms_error: float
@@ -124,23 +130,19 @@ def options_of(
     ratio: float | None = None,
     *,
     method: str = "adaptive",
-    decay: float | None = None,
-    isovalue: float | None = None,
-    spacing: float | None = None,
-    padding: float | None = None,
     effort: int | None = None,
     steps: int | None = None,
-    mesh_spacing: float | None = None,
     l1: Mapping[str, Any] | None = None,
+    part_atoms: int | None = None,
+    jobs: int | None = None,
+    mesh_spacing: float | None = None,
+    **points: float | None,
 ) -> Any:
     """The library's structure; None leaves what is the default there."""
     options = _abi.filled(
         _abi.FitOptions,
         method=choice(method, METHODS, "method"),
-        decay=decay,
-        isovalue=isovalue,
-        spacing=spacing,
-        padding=padding,
+        **points,
     )
     goal = any(value is not None for value in (tolerance, ellipsoids, ratio))
     if method == "l1" and goal:
@@ -148,11 +150,16 @@ def options_of(
     if method != "l1" and l1:
         raise ArgumentError("l1 holds options of method='l1'")
     _goal(options, tolerance, ellipsoids, ratio)
-    for name, value in (("effort", effort), ("steps", steps)):
+    for kind, name, value in (
+        (options.adaptive, "effort", effort),
+        (options.adaptive, "steps", steps),
+        (options.parts, "atoms", part_atoms),
+        (options.parts, "jobs", jobs),
+    ):
         if value is not None:
             if not 0 <= value < 2**32:
                 raise ArgumentError(f"{name} is {value}")
-            setattr(options.adaptive, name, value)
+            setattr(kind, name, value)
     if mesh_spacing is not None:
         options.adaptive.mesh_spacing = mesh_spacing
     _set_l1(options.l1, l1 or {})
@@ -175,6 +182,7 @@ def _report(result: Any, atoms: int, stopped: bool) -> FitReport:
         spacing=result.spacing,
         points=count(result.points),
         iterations=count(result.iterations),
+        parts=count(result.parts) or 1,
         sample_seconds=result.sample_seconds,
         fit_seconds=result.fit_seconds,
         rms_error=result.l1.rms_error,
@@ -191,6 +199,8 @@ def settings_of(options: Any, report: FitReport) -> str:
         words.append(f"{goal} {getattr(options.adaptive, goal):.9g}")
         words += [f"effort {options.adaptive.effort}", f"steps {options.adaptive.steps}"]
         words.append(f"mesh-spacing {options.adaptive.mesh_spacing:.9g}")
+        if report.parts > 1:
+            words.append(f"parts {report.parts}")
     else:
         words += [f"iterations {options.l1.iterations}", f"kernel {KERNELS[options.l1.kernel]}"]
     return ", ".join(words)
@@ -215,28 +225,19 @@ class Fitter:
     >>> next = fitter.fit(tolerance=0.5)                      # doctest: +SKIP
     """
 
+    @spelled_out(SurfaceOptions)
     def __init__(
         self,
         molecule: Molecule,
         *,
-        decay: float | None = None,
-        isovalue: float | None = None,
-        spacing: float | None = None,
-        padding: float | None = None,
-        mesh_spacing: float | None = None,
         context: Context | None = None,
+        **surface: Unpack[SurfaceOptions],
     ) -> None:
-        self._surface = {
-            "decay": decay,
-            "isovalue": isovalue,
-            "spacing": spacing,
-            "padding": padding,
-            "mesh_spacing": mesh_spacing,
-        }
+        self._surface = surface
         self.context = context or default_context()
         self.atoms = len(molecule)
         self.molecule: Molecule | None = molecule  # None where its atoms have moved
-        options = options_of(**self._surface)  # type: ignore[arg-type]
+        options = options_of(**self._surface)
         made = ctypes.c_void_p()
         self.context._call(
             lib.fitter_create, molecule._pointer, ctypes.byref(options), ctypes.byref(made)
@@ -247,18 +248,13 @@ class Fitter:
     def __repr__(self) -> str:
         return f"<ovoid.Fitter of {self.atoms} atoms>"
 
+    @spelled_out(SearchOptions)
     def fit(
         self,
         tolerance: float | None = None,
         ellipsoids: int | None = None,
         ratio: float | None = None,
-        *,
-        method: str = "adaptive",
-        effort: int | None = None,
-        steps: int | None = None,
-        l1: Mapping[str, Any] | None = None,
-        time_limit: float | None = None,
-        progress: ProgressLike = False,
+        **search: Unpack[SearchOptions],
     ) -> Model:
         """Fits a model to the surface. The parameters are those of `Molecule.fit`.
 
@@ -268,14 +264,10 @@ class Fitter:
         """
         from ._model import Model
 
-        options = options_of(
-            *(tolerance, ellipsoids, ratio),
-            method=method,
-            effort=effort,
-            steps=steps,
-            l1=l1,
-            **self._surface,  # type: ignore[arg-type]
-        )
+        wanted: dict[str, Any] = {**search, **self._surface}
+        time_limit = wanted.pop("time_limit", None)
+        progress = wanted.pop("progress", False)
+        options = options_of(tolerance, ellipsoids, ratio, **wanted)
         if time_limit is not None and not time_limit > 0:
             raise ArgumentError(f"time_limit is {time_limit}, and must be above 0 s")
         result = _abi.filled(_abi.FitResult)

@@ -12,17 +12,16 @@ import numpy.typing as npt
 
 from ._abi import lib
 from ._context import Context, Handle, ProgressLike, encode, host_context, is_missing
-from ._field import DECAY, ISOVALUE, SPACING, Field
+from ._field import Field
 from ._measure import Measures, measure_fields
-from ._mesh import Mesh
 from ._scene import Scene
+from ._surface import DECAY, ISOVALUE, SPACING, Pictured
 from ._views import Doubles, doubles, view
 from .errors import ArgumentError, EmptyError, FileError
 
 if TYPE_CHECKING:
     from ._fit import FitReport
     from ._molecule import Molecule
-    from ._picture import Image
 
 
 def _rotations(angles: Doubles) -> Doubles:
@@ -54,7 +53,7 @@ def _frozen(array: Any) -> Any:
     return array
 
 
-class Model:
+class Model(Pictured):
     """Ellipsoids: Gaussians a·exp(-(x-μ)ᵀA(x-μ)) whose sum has a surface like a molecule's.
 
     It comes from `Molecule.fit` or `read_model`, or is made of arrays. All arrays are read-only.
@@ -257,40 +256,15 @@ class Model:
 
     # ---- what is made of it ----
 
-    def field(self, *, context: Context | None = None) -> Field:
-        """Its field, as `Field` makes it."""
-        return Field(self, context=context)
-
-    def mesh(
+    def field(
         self,
-        spacing: float = SPACING,
+        decay: float | None = None,
         isovalue: float | None = None,
         *,
-        vertices: str = "exact",
-        progress: ProgressLike = False,
         context: Context | None = None,
-    ) -> Mesh:
-        """The mesh of its surface.
-
-        Parameters
-        ----------
-        spacing : float
-            Of the marching-cubes lattice (Å).
-        isovalue : float, optional
-            c; default: the model's.
-        vertices : {"exact", "linear"}
-            On the surface itself, or interpolated along the lattice's edges.
-        progress : bool or callable
-            See `Molecule.fit`.
-        context : Context, optional
-
-        Returns
-        -------
-        Mesh
-        """
-        return self.field(context=context).mesh(
-            spacing, isovalue, vertices=vertices, progress=progress
-        )
+    ) -> Field:
+        """Its field, as `Field` makes it. Its decay and isovalue are its own."""
+        return Field(self, decay=decay, isovalue=isovalue, context=context)
 
     def measure(
         self,
@@ -335,68 +309,9 @@ class Model:
             progress,
         )
 
-    def render(
-        self,
-        molecule: Molecule | None = None,
-        *,
-        view: str | None = None,
-        size: tuple[int, int] = (1200, 900),
-        isovalue: float | None = None,
-        samples: int | None = None,
-        rotation: tuple[float, float, float] | None = None,
-        transparent: bool = False,
-        progress: ProgressLike = False,
-        context: Context | None = None,
-    ) -> Image:
-        """A picture, with the molecule that the views "overlay", "difference" and "panel" need.
-
-        Parameters
-        ----------
-        molecule : Molecule, optional
-        view : {"original", "model", "overlay", "difference", "ellipsoids", "panel"}, optional
-            Default: "overlay" with a molecule, else "model".
-        size : (width, height)
-            Pixels.
-        isovalue : float, optional
-            c.
-        samples : int, optional
-            Rays across a pixel.
-        rotation : (x, y, z), optional
-            Radian about the screen's axes.
-        transparent : bool
-            Instead of the white background.
-        progress : bool or callable
-            See `Molecule.fit`.
-        context : Context, optional
-
-        Returns
-        -------
-        Image
-        """
-        from ._picture import render
-
-        original = None
-        if molecule is not None:
-            original = molecule.field(self.decay, self.isovalue, context=context)
-        return render(
-            original,
-            self.field(context=context),
-            view or ("model" if molecule is None else "overlay"),
-            size,
-            samples=samples,
-            isovalue=isovalue,
-            rotation=rotation,
-            transparent=transparent,
-            progress=progress,
-        )
-
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes a model file (.ovoid), whole or not at all."""
         host_context()._call(lib.model_write, self._pointer, encode(path))
-
-    def export(self, path: str | os.PathLike[str], **options: Any) -> None:
-        """Writes a file for ChimeraX, PyMOL and others, or a map; see `Field.export`."""
-        self.field().export(path, **options)
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
         """What a notebook shows: a `Scene` with the molecule that it was fitted to."""

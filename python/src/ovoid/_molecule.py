@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,15 +14,17 @@ import numpy.typing as npt
 from . import _abi
 from ._abi import MOLECULE_COUNTS, lib
 from ._context import Context, Handle, ProgressLike, encode, host_context, is_missing
-from ._field import SPACING, Field
+from ._field import Field
 from ._fit import Fitter, choice
-from ._mesh import Mesh
+from ._options import FitOptions, SearchOptions, SurfaceOptions, part, spelled_out
+from ._surface import Pictured
 from ._views import Doubles, doubles, view
 from .errors import ArgumentError, EmptyError, FileError
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
     from ._model import Model
-    from ._picture import Image
 
 FORMATS = ("auto", "pqr", "xyzr", "pdb", "mmcif")
 RADII = ("default", "own", "bondi", "paper", "united", "file")
@@ -50,7 +51,7 @@ class Assembly:
     atoms: int
 
 
-class Molecule:
+class Molecule(Pictured):
     """Atoms with a place and a radius.
 
     Parameters
@@ -209,55 +210,15 @@ class Molecule:
         """Its field, as `Field` makes it."""
         return Field(self, decay=decay, isovalue=isovalue, context=context)
 
-    def mesh(
-        self,
-        spacing: float = SPACING,
-        isovalue: float | None = None,
-        *,
-        decay: float | None = None,
-        vertices: str = "exact",
-        progress: ProgressLike = False,
-        context: Context | None = None,
-    ) -> Mesh:
-        """The mesh of its surface.
-
-        Parameters
-        ----------
-        spacing : float
-            Of the marching-cubes lattice (Å).
-        isovalue, decay : float, optional
-            c (default 1) and d (Å⁻², default 0.5).
-        vertices : {"exact", "linear"}
-            On the surface itself, or interpolated along the lattice's edges.
-        progress : bool or callable
-            See `fit`.
-        context : Context, optional
-
-        Returns
-        -------
-        Mesh
-        """
-        field = self.field(decay, isovalue, context=context)
-        return field.mesh(spacing, vertices=vertices, progress=progress)
-
+    @spelled_out(FitOptions)
     def fit(
         self,
         tolerance: float | None = None,
         ellipsoids: int | None = None,
         ratio: float | None = None,
         *,
-        method: str = "adaptive",
-        decay: float | None = None,
-        isovalue: float | None = None,
-        spacing: float | None = None,
-        padding: float | None = None,
-        mesh_spacing: float | None = None,
-        effort: int | None = None,
-        steps: int | None = None,
-        l1: Mapping[str, Any] | None = None,
-        time_limit: float | None = None,
-        progress: ProgressLike = False,
         context: Context | None = None,
+        **options: Unpack[FitOptions],
     ) -> Model:
         """Finds a few ellipsoids whose surface is near the molecule's.
 
@@ -281,6 +242,11 @@ class Molecule:
             1 (default) to 10: more starts and repairs, more time.
         steps : int, optional
             Of each refinement at most (default 60).
+        part_atoms : int, optional
+            Fits the molecule in parts of at most so many atoms, from 64, so that memory follows a
+            part; default: parts of 16384 where there are more than 65536 atoms.
+        jobs : int, optional
+            So many parts side by side; the model stays the same.
         l1 : mapping, optional
             Options of method l1 by their names in the C interface, such as ``{"iterations": 500}``.
         time_limit : float, optional
@@ -303,78 +269,11 @@ class Molecule:
         Interrupted
             Ctrl-C. It is a KeyboardInterrupt, and its ``model`` is the best one that held, if any.
         """
-        fitter = Fitter(
-            self,
-            decay=decay,
-            isovalue=isovalue,
-            spacing=spacing,
-            padding=padding,
-            mesh_spacing=mesh_spacing,
-            context=context,
-        )
-        model = fitter.fit(
-            *(tolerance, ellipsoids, ratio),
-            method=method,
-            effort=effort,
-            steps=steps,
-            l1=l1,
-            time_limit=time_limit,
-            progress=progress,
-        )
+        fitter = Fitter(self, context=context, **part(options, SurfaceOptions))
+        model = fitter.fit(tolerance, ellipsoids, ratio, **part(options, SearchOptions))
         if self._name:
             model._annotate("input", self._name)
         return model
-
-    def render(
-        self,
-        size: tuple[int, int] = (1200, 900),
-        *,
-        decay: float | None = None,
-        isovalue: float | None = None,
-        samples: int | None = None,
-        rotation: tuple[float, float, float] | None = None,
-        transparent: bool = False,
-        progress: ProgressLike = False,
-        context: Context | None = None,
-    ) -> Image:
-        """A picture of its surface. `Model.render` shows both.
-
-        Parameters
-        ----------
-        size : (width, height)
-            Pixels.
-        decay, isovalue : float, optional
-            d (Å⁻²) and c.
-        samples : int, optional
-            Rays across a pixel.
-        rotation : (x, y, z), optional
-            Radian about the screen's axes.
-        transparent : bool
-            Instead of the white background.
-        progress : bool or callable
-            See `fit`.
-        context : Context, optional
-
-        Returns
-        -------
-        Image
-        """
-        from ._picture import render
-
-        return render(
-            self.field(decay, isovalue, context=context),
-            None,
-            "original",
-            size,
-            samples=samples,
-            rotation=rotation,
-            transparent=transparent,
-            progress=progress,
-        )
-
-    def export(self, path: str | os.PathLike[str], **options: Any) -> None:
-        """Writes a map of its field; the options are those of `Field.export`."""
-        self.field().export(path, **options)
 
 
 def _restore(

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from . import _abi
 from ._abi import lib
 from ._context import Context, ProgressLike, default_context, encode
-from ._field import export_options
 from ._fit import choice
+from ._surface import export_options
 from .errors import ArgumentError, OvoidError, OvoidWarning
 
 if TYPE_CHECKING:
@@ -157,5 +157,5 @@ class Scene:
         size = 800, 600
         if not self.models:
             assert self.molecule is not None
-            return self.molecule.render(size, context=self.context)
+            return self.molecule.render(size=size, context=self.context)
         return self.models[0].render(view="ellipsoids", size=size, context=self.context)

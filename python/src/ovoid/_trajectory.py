@@ -5,21 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ._context import Context, default_context
-from ._field import SPACING, Field
+from ._field import Field
 from ._fit import Fitter
 from ._measure import measure_fields
 from ._mesh import mesh_field
 from ._model import Model
 from ._molecule import Molecule
 from ._objects import _READERS, molecule
+from ._options import SurfaceOptions, spelled_out
+from ._surface import SPACING
 from ._views import Doubles, doubles
 from .errors import ArgumentError
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Frame = tuple[int, float, Any]  # number, time (ps, NaN unknown), coordinates (Å)
 
@@ -238,7 +243,7 @@ class Fits:
         atoms: Molecule,
         *,
         goal: dict[str, Any],
-        surface: dict[str, Any],
+        surface: SurfaceOptions,
         fresh_every: int,
         measure: bool,
         keep_models: bool,
@@ -370,6 +375,7 @@ def measure_trajectory(
     return SurfaceTrajectory(**columns(rows, ["frame", "time", *Surfaces.names]))
 
 
+@spelled_out(SurfaceOptions)
 def fit_trajectory(
     trajectory: Any,
     atoms: Molecule | None = None,
@@ -384,14 +390,10 @@ def fit_trajectory(
     fresh_every: int = 0,
     measure: bool = True,
     keep_models: bool = True,
-    decay: float | None = None,
-    isovalue: float | None = None,
-    spacing: float | None = None,
-    padding: float | None = None,
-    mesh_spacing: float | None = None,
     effort: int | None = None,
     progress: bool = False,
     context: Context | None = None,
+    **surface: Unpack[SurfaceOptions],
 ) -> FitTrajectory:
     """Fits a model to each frame of a trajectory, each beginning with the one before.
 
@@ -422,11 +424,10 @@ def fit_trajectory(
     """
     first, count, moving = _frames(trajectory, atoms, radii, slice(start, stop, step))
     goal = {"tolerance": tolerance, "ellipsoids": ellipsoids, "ratio": ratio, "effort": effort}
-    surface = {"decay": decay, "isovalue": isovalue, "spacing": spacing, "padding": padding}
     fits = Fits(
         first,
         goal=goal,
-        surface={**surface, "mesh_spacing": mesh_spacing},
+        surface=surface,
         fresh_every=fresh_every,
         measure=measure,
         keep_models=keep_models,

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from MDAnalysis.analysis.base import AnalysisBase
 
 from ._context import Context
-from ._field import SPACING
 from ._objects import molecule
+from ._options import SurfaceOptions, spelled_out
+from ._surface import SPACING
 from ._trajectory import Fits, Surfaces, columns
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class SurfaceAnalysis(AnalysisBase):  # type: ignore[misc]
@@ -81,6 +85,7 @@ class FitAnalysis(SurfaceAnalysis):
         The columns of `ovoid.FitTrajectory`, arrays of shape (frames,), and ``models``, a list.
     """
 
+    @spelled_out(SurfaceOptions)
     def __init__(
         self,
         atoms: Any,
@@ -95,7 +100,7 @@ class FitAnalysis(SurfaceAnalysis):
         effort: int | None = None,
         context: Context | None = None,
         verbose: bool = False,
-        **surface: Any,
+        **surface: Unpack[SurfaceOptions],
     ) -> None:
         super().__init__(atoms, radii=radii, context=context, verbose=verbose)
         goal = {"tolerance": tolerance, "ellipsoids": ellipsoids, "ratio": ratio, "effort": effort}

@@ -17,7 +17,7 @@
 
 #include <sys/stat.h>
 
-enum { ATOMS = 4, POINTS = 20, WIDTH = 40, HEIGHT = 16, NAMES = 32, FEW = 50 };
+enum { ATOMS = 4, POINTS = 20, WIDTH = 40, HEIGHT = 16, NAMES = 40, FEW = 50 };
 
 static struct {
     scratch *place;

@@ -88,6 +88,10 @@ cleanup:
     return status;
 }
 
+void ov_judge_begin(ov_judge *judge) {
+    ov_marcher_begin(judge->marcher);
+}
+
 void ov_judge_destroy(ov_judge *judge) {
     ov_marcher_destroy(&judge->marcher);
     ov_meter_destroy(&judge->meter);

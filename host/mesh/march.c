@@ -1086,6 +1086,13 @@ void ov_marcher_stay(ov_marcher *m) {
     }
 }
 
+void ov_marcher_begin(ov_marcher *m) {
+    drop_grid(m);
+    ov_lists_forget(&m->lists);
+    ov_lists_forget(&m->vertex_lists);
+    m->placed_vertices = m->corners_triangles = 0;
+}
+
 void ov_marcher_destroy(ov_marcher **kept) {
     if (!*kept)
         return;

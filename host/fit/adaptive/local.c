@@ -201,6 +201,12 @@ cleanup:
     return status;
 }
 
+void ov_local_begin(ov_local *l) {
+    ov_refiner_begin(&l->refiner);
+    ov_lists_forget(&l->reached);
+    ov_lists_forget(&l->lists);
+}
+
 void ov_local_destroy(ov_local *l) {
     ov_refiner_destroy(&l->refiner);
     ov_terms_destroy(&l->moving);

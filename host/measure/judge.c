@@ -147,17 +147,6 @@ static void add_spots(const ovoid_mesh *mesh, const float *distance, double leas
 /* What rounding may add to a distance in a grid, as a share. */
 #define ROUNDING 1e-4
 
-static ovoid_status grid_of_spots(ovoid_context *context, const ov_spot *spots, size_t count,
-                                  double apart, ov_grid *grid) {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t n = 0; n < count; ++n)
-        for (size_t k = 0; k < 3; ++k) {
-            low[k] = fmin(low[k], spots[n].at[k]);
-            high[k] = fmax(high[k], spots[n].at[k]);
-        }
-    return ov_grid_create(context, low, high, (1.0 + ROUNDING) * apart, count, count, grid);
-}
-
 /* Whether one of the spots in the grid is nearer than that. */
 static bool has_near(const ov_grid *grid, const ov_spot *spots, const double at[3], double apart) {
     uint32_t near[2 * OV_NEAR_MAX];
@@ -182,7 +171,8 @@ static ovoid_status thin_spots(ovoid_context *context, ov_spot *spots, size_t *c
         return OVOID_OK;
     qsort(spots, *count, sizeof *spots, by_distance);
     if (apart > 0.0)
-        OV_TRY(grid_of_spots(context, spots, *count, apart, &grid));
+        OV_TRY(ov_grid_about(context, spots->at, sizeof *spots, *count, (1.0 + ROUNDING) * apart,
+                             &grid));
     for (size_t n = 0; n < *count && kept < most; ++n) {
         if (apart > 0.0 && has_near(&grid, spots, spots[n].at, apart))
             continue;

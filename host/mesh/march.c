@@ -471,8 +471,9 @@ static ovoid_status make_vertices(ovoid_context *context, marcher *m, size_t pac
     bool begun = begin;
     OV_TRY(fill_vertices(context, m, packs));
     OV_TRY(box_packs(context, m, packs));
-    OV_TRY(begin_lists(context, m, &m->vertex_lists, &m->vertex_points, &begun));
-    status = refine(context, m, packs);
+    status = begin_lists(context, m, &m->vertex_lists, &m->vertex_points, &begun);
+    if (status == OVOID_OK)
+        status = refine(context, m, packs);
     *whole = true;
     if (begun && status == OVOID_OK)
         status = ov_lists_end(context, &m->vertex_lists, whole);

@@ -41,9 +41,10 @@ static ovoid_status find_packs(ov_local *l, const ov_points *points) {
     bool begun, whole = true;
     l->reached.packs_only = true;
     begun = ov_lists_built(&l->reached);
-    OV_TRY(begun ? ov_lists_begin(context, &l->reached, points, &l->moving, 0.0)
-                 : ov_lists_build(context, &l->reached, points, &l->moving, 0.0));
-    status = ov_packs_reached(context, &l->reached, &l->list, &l->packs);
+    status = begun ? ov_lists_begin(context, &l->reached, points, &l->moving, 0.0)
+                   : ov_lists_build(context, &l->reached, points, &l->moving, 0.0);
+    if (status == OVOID_OK)
+        status = ov_packs_reached(context, &l->reached, &l->list, &l->packs);
     if (begun && status == OVOID_OK)
         status = ov_lists_end(context, &l->reached, &whole);
     else if (begun)

@@ -2,8 +2,8 @@
  * The search's account by place (host/fit/adaptive/places.h), and going back to atoms here and
  * there (ov_adaptive_rebuild(), host/fit/adaptive/rebuild.c), by hand.
  */
-#include "fit/adaptive/search.h"
 #include "fit/adaptive/places.h"
+#include "fit/adaptive/search.h"
 #include "support.h"
 
 /* ---- places ------------------------------------------------------------------------------- */

@@ -5,8 +5,8 @@
 #ifndef OV_ADAPTIVE_TOLERANCE_H
 #define OV_ADAPTIVE_TOLERANCE_H
 
-#include "fit/adaptive/search.h"
 #include "fit/adaptive/places.h"
+#include "fit/adaptive/search.h"
 
 /* How long growing may go on. */
 typedef struct ov_growing {

@@ -6,8 +6,8 @@
  * nor memory.
  *
  * OVOID_FAULTS=1 takes every call by itself, and does the work again after two in ten, which takes
- * minutes for the fits; a larger number, each of so many (bench/results/faults.csv). Without it, all
- * of few fail, and of many one of each function's by itself, and some with all that follow.
+ * minutes for the fits; a larger number, each of so many (bench/results/faults.csv). Without it,
+ * all of few fail, and of many one of each function's by itself, and some with all that follow.
  * OVOID_FAULTS_WORK="fit by l1" takes the works alone whose names begin so.
  */
 #include "faults.h"

@@ -12,7 +12,8 @@
  *   number     half as many ellipsoids as that takes
  *   effort     the same with effort 2
  *   warm       from the model within the tolerance to 3/4 and to 3/2 of its ellipsoids, together
- *   frame      from that model to other coordinates of the atoms, within the tolerance
+ *   frame      to the tolerance, and in the same session to other coordinates of the atoms, which
+ *              alone counts
  *   l1         300 iterations of method l1
  *
  * A constant takes part where it is used. The rest of the library is as it is; this program
@@ -237,7 +238,7 @@ static void fit(subject *s, ovoid_fitter *fitter, fit_kind kind, sums *sum) {
         }
         return;
     case FRAME:
-        stop(s, ovoid_fitter_start_from(s->context, fitter, s->model));
+        reach(s, fitter, s->field, &options, NULL, &(sums){0});
         stop(s, ovoid_fitter_move(s->context, fitter, s->moved));
         reach(s, fitter, s->moved_field, &options, NULL, sum);
         return;

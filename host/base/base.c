@@ -189,6 +189,14 @@ ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capaci
     return OVOID_OK;
 }
 
+uint64_t ov_hash(const void *bytes, size_t count) {
+    const unsigned char *byte = bytes;
+    uint64_t value = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < count; i++)
+        value = (value ^ byte[i]) * 0x100000001b3u;
+    return value;
+}
+
 double ov_seconds(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);

@@ -55,6 +55,9 @@ ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capaci
 /* Bytes of the UTF-8 character at text, 0 if there is none (RFC 3629, section 4). */
 size_t ov_utf8_length(const unsigned char *text);
 
+/* FNV-1a, 64 bits (Fowler, Noll, Vo). */
+uint64_t ov_hash(const void *bytes, size_t count);
+
 /* Seconds of a monotonic clock. */
 double ov_seconds(void);
 

@@ -338,6 +338,8 @@ int fit_run(fit_job *job) {
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
     const int written = write_outputs(job);
+    if (job->written && job->options.parts.checkpoint)
+        remove(job->options.parts.checkpoint); /* it has done its part */
     if (written != CLI_OK || levels != CLI_OK || measured != CLI_OK)
         return written != CLI_OK ? written : levels != CLI_OK ? levels : measured;
     return compare_with_goal(job);

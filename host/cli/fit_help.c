@@ -93,6 +93,15 @@ static void print_adaptive(const ovoid_fit_options *defaults, FILE *stream) {
         OVOID_DEFAULT_TOLERANCE, (int)CLI_GOAL);
     cli_number_help(&fit_levels_number, &job, stream);
     print_numbers(fit_adaptive_numbers, fit_adaptive_count, defaults, stream);
+    cli_option_help(
+        "--checkpoint FILE",
+        "keep each part in FILE as soon as it is done, until the model is written; with "
+        "--resume a run that was ended goes on from there, to the same model",
+        stream);
+    cli_option_help("--resume",
+                    "go on from the file of --checkpoint, if it is there; one of other atoms, "
+                    "options, device or version is refused",
+                    stream);
 }
 
 static void print_l1(const ovoid_fit_options *defaults, FILE *stream) {

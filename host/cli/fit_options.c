@@ -40,6 +40,12 @@ const cli_number fit_adaptive_numbers[] = {
     COUNT("steps", adaptive.steps, 0, UINT32_MAX,
           "steps of each refinement (Levenberg-Marquardt) at most; 0 leaves the merged Gaussians "
           "as they are"),
+    COUNT("part-atoms", parts.atoms, 0, UINT32_MAX,
+          "fits the molecule in parts of at most so many atoms, from 64, so that memory follows a "
+          "part and not the molecule; 0: in parts of 16384 where there are more than 65536"),
+    COUNT("jobs", parts.jobs, 0, OVOID_MOST_JOBS,
+          "so many parts side by side, each with a thread of its own: the model stays the same; 0: "
+          "one"),
 };
 const size_t fit_adaptive_count = sizeof fit_adaptive_numbers / sizeof *fit_adaptive_numbers;
 
@@ -120,6 +126,8 @@ enum {
     FIRST_STEP,
     NO_MEASURE,
     MESH_SPACING,
+    CHECKPOINT,
+    RESUME,
     LEVELS,
     TIME_LIMIT,
     PROFILE,
@@ -141,6 +149,8 @@ static const struct option named[] = {
     {"first-step", required_argument, NULL, FIRST_STEP},
     {"no-measure", no_argument, NULL, NO_MEASURE},
     {"mesh-spacing", required_argument, NULL, MESH_SPACING},
+    {"checkpoint", required_argument, NULL, CHECKPOINT},
+    {"resume", no_argument, NULL, RESUME},
     {"levels", required_argument, NULL, LEVELS},
     {"time-limit", required_argument, NULL, TIME_LIMIT},
     {"profile", no_argument, NULL, PROFILE},
@@ -306,6 +316,21 @@ static bool complete_options(const parser *p) {
     return true;
 }
 
+/* One file holds the parts of one fit. */
+static bool check_checkpoint(const fit_job *job) {
+    const ovoid_parts_options *parts = &job->options.parts;
+    const char *const with = job->folder ? "several molecules, or --out-dir" : "--levels";
+    if (parts->resume && !parts->checkpoint) {
+        cli_error("--resume goes on from a checkpoint: name its file, --checkpoint FILE");
+        return false;
+    }
+    if (parts->checkpoint && (job->folder || job->level_count > 1)) {
+        cli_error("--checkpoint does not go with %s: it holds the parts of one fit", with);
+        return false;
+    }
+    return true;
+}
+
 static bool complete(int argc, char **argv, const parser *p) {
     if (optind == argc) {
         cli_error("which molecule? Name its file: ovoid fit MOLECULE (see 'ovoid fit --help')");
@@ -319,6 +344,8 @@ static bool complete(int argc, char **argv, const parser *p) {
     job->input_count = (size_t)(argc - optind);
     if (job->input_count > 1 && !job->folder)
         job->folder = ".";
+    if (!check_checkpoint(job))
+        return false;
     return job->folder ? fit_batch_check(job) : fit_outputs_name(job) && fit_outputs_check(job);
 }
 
@@ -367,6 +394,14 @@ static bool parse_named(parser *p, int option) {
         return parse_first_step(optarg, &job->options.l1.first_step);
     case NO_MEASURE:
         job->measure = false;
+        return true;
+    case CHECKPOINT:
+        p->adaptive = "checkpoint";
+        job->options.parts.checkpoint = optarg;
+        return true;
+    case RESUME:
+        p->adaptive = "resume";
+        job->options.parts.resume = 1;
         return true;
     case PROFILE:
         job->profile.wanted = true;

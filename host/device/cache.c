@@ -11,14 +11,6 @@
 #define HEADER_FORMAT "ovoid program 1 %016" PRIx64 " %016" PRIx64 " %016" PRIx64 "\n"
 #define HEADER_LENGTH 67
 
-uint64_t ov_hash(const void *bytes, size_t count) {
-    const unsigned char *byte = bytes;
-    uint64_t value = 0xcbf29ce484222325u;
-    for (size_t i = 0; i < count; i++)
-        value = (value ^ byte[i]) * 0x100000001b3u;
-    return value;
-}
-
 static void make_header(char header[HEADER_LENGTH + 1], const ov_text *key, const void *binary,
                         size_t bytes) {
     snprintf(header, HEADER_LENGTH + 1, HEADER_FORMAT, (uint64_t)key->length, (uint64_t)bytes,

@@ -74,6 +74,13 @@ ovoid_status ov_selftest_brief(ovoid_context *context, char text[OV_SELFTEST_TEX
 /* The context's device, opening the default one if none is open yet. */
 ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
 
+/* Opens the device of one context in another one, with a queue of its own: for a thread of its own.
+ */
+ovoid_status ov_device_open_again(const ovoid_context *context, ovoid_context *another);
+
+/* Stands for all that bits depend on besides the input: the device, its driver, the kernels. */
+ovoid_status ov_device_hash(ovoid_context *context, uint64_t *hash);
+
 /* Releases programs, queue and device; nothing happens when none is open. */
 void ov_device_close(ovoid_context *context);
 

@@ -212,9 +212,6 @@ ovoid_status ov_whole_source(ov_text *text);
 /* Releases all programs of the device, and their kernels. */
 void ov_programs_release(ov_device *device);
 
-/* FNV-1a, 64 bits (Fowler, Noll, Vo). */
-uint64_t ov_hash(const void *bytes, size_t count);
-
 /* The cache of compiled programs, and of self-tests passed: one file <program>-<hash of key>.bin
  * each, which holds the whole key and a checksum, so that neither a collision nor a damaged file
  * can pass for a program. The key is everything that the binary depends on. */

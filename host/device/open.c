@@ -201,6 +201,16 @@ ovoid_status ov_device_open(ovoid_context *context, const ov_device_entry *entry
     return OVOID_OK;
 }
 
+ovoid_status ov_device_open_again(const ovoid_context *context, ovoid_context *another) {
+    const ov_device *const device = context->device;
+    const ov_device_entry entry = {
+        .info = device->info, .platform = device->platform, .id = device->id};
+    const ovoid_status status = ov_device_open(another, &entry, NULL);
+    if (status == OVOID_OK)
+        another->device->trusted = device->trusted;
+    return status;
+}
+
 ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector) {
     ovoid_status status = OVOID_OK;
     ov_device_entry *entries = NULL;

@@ -8,6 +8,7 @@
 #include "fit/l1/l1.h"
 #include "fit/motion.h"
 #include "fit/options.h"
+#include "fit/parts/parts.h"
 #include "model/factor.h"
 #include "model/model.h"
 #include "model/owner.h"
@@ -155,12 +156,15 @@ static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *
     ovoid_context *const context = fitter->context;
     ov_found found = {0};
     OV_TRY(ov_adaptive_check(context, &options->adaptive, fitter->atoms));
-    if (!fitter->adaptive)
-        OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, !fitter->once,
+    const bool in_parts = fitter->start.count == 0 && ov_parts_wanted(options, fitter->atoms);
+    if (!in_parts && !fitter->adaptive)
+        OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, NULL, !fitter->once,
                                   &fitter->adaptive));
-    status =
-        ov_adaptive_reach(fitter->adaptive, options,
-                          fitter->start.count > 0 ? &fitter->start : NULL, began, &found, result);
+    status = in_parts ? ov_parts_reach(context, fitter->xyzr, fitter->atoms, options, began, &found,
+                                       result)
+                      : ov_adaptive_reach(fitter->adaptive, options,
+                                          fitter->start.count > 0 ? &fitter->start : NULL, began,
+                                          &found, result);
     if (found.count > 0) {
         if (hand_over(context, &found, fitter->atoms, ellipsoids, owner) != OVOID_OK) {
             status = OVOID_ERROR_MEMORY;

@@ -38,6 +38,7 @@ void ovoid_fit_options_init(ovoid_fit_options *options, size_t size) {
                 .grow = 2.0,
                 .max_backtracks = 30,
             },
+        .parts = {.atoms = 0, .jobs = 0, .resume = 0, .checkpoint = NULL},
     };
     ov_sized_init(options, size, &defaults, sizeof defaults);
 }
@@ -55,6 +56,7 @@ void ovoid_fit_result_init(ovoid_fit_result *result, size_t size) {
         .adaptive = {OVOID_UNKNOWN},
         .counts = {OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN,
                    OVOID_UNKNOWN, OVOID_UNKNOWN},
+        .parts = OVOID_UNKNOWN,
     };
     ov_sized_init(result, size, &unknown, sizeof unknown);
 }
@@ -106,6 +108,21 @@ static ovoid_status check_adaptive(ovoid_context *context, const ovoid_adaptive_
     return check_ranges(context, ranges, sizeof ranges / sizeof *ranges);
 }
 
+static ovoid_status check_parts(ovoid_context *context, const ovoid_parts_options *parts) {
+    if (parts->atoms > 0 && parts->atoms < OVOID_LEAST_PART_ATOMS)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option parts.atoms must be 0 or at least %d; it is %lu",
+                       OVOID_LEAST_PART_ATOMS, (unsigned long)parts->atoms);
+    if (parts->jobs > OVOID_MOST_JOBS)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option parts.jobs must be at most %d; it is %lu", OVOID_MOST_JOBS,
+                       (unsigned long)parts->jobs);
+    if (parts->resume && !parts->checkpoint)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option parts.resume needs a checkpoint to go on from");
+    return OVOID_OK;
+}
+
 static ovoid_status check_l1(ovoid_context *context, const ovoid_l1_options *l1) {
     const range ranges[] = {
         {"iterations", l1->iterations, 1.0, UINT32_MAX, false},
@@ -149,8 +166,10 @@ ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_option
     if (status != OVOID_OK)
         return status;
     switch (options->method) {
-    case OVOID_METHOD_ADAPTIVE:
-        return check_adaptive(context, &options->adaptive);
+    case OVOID_METHOD_ADAPTIVE: {
+        const ovoid_status parts = check_parts(context, &options->parts);
+        return parts != OVOID_OK ? parts : check_adaptive(context, &options->adaptive);
+    }
     case OVOID_METHOD_L1:
         return check_l1(context, &options->l1);
     }

@@ -100,6 +100,7 @@ void ov_judge_destroy(ov_judge *judge) {
     ov_facets_destroy(&judge->other);
     ov_trail_destroy(&judge->trail);
     ovoid_mesh_destroy(&judge->mesh);
+    free(judge->excused);
     memset(judge, 0, sizeof *judge);
 }
 
@@ -131,11 +132,41 @@ static int by_distance(const void *a, const void *b) {
     return 0;
 }
 
+bool ov_spots_near(const ov_spot *spots, size_t count, const double at[3], double reach) {
+    for (size_t n = 0; n < count; ++n) {
+        const double x = at[0] - spots[n].at[0], y = at[1] - spots[n].at[1],
+                     z = at[2] - spots[n].at[2];
+        if (x * x + y * y + z * z < reach * reach)
+            return true;
+    }
+    return false;
+}
+
+/* Whether a vertex is where surfaces count. */
+static bool is_judged(const ov_judge *judge, const double at[3]) {
+    for (int k = 0; k < 3; ++k)
+        if (at[k] < judge->low[k] || at[k] > judge->high[k])
+            return false;
+    return !ov_spots_near(judge->excused, judge->excused_count, at, judge->excused_reach);
+}
+
+/* Whether a vertex counts; *outer: as one of an outer surface. */
+static bool counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, bool *outer) {
+    double at[3];
+    *outer = ov_mesh_is_outer(mesh, vertex);
+    if (!judge->in_region)
+        return true;
+    ov_mesh_at(mesh, vertex, at);
+    *outer |= ov_spots_near(judge->wanted, judge->wanted_count, at, judge->excused_reach);
+    return is_judged(judge, at);
+}
+
 /* Counts them alone where spots is NULL. */
-static void add_spots(const ovoid_mesh *mesh, const float *distance, double least, ov_spot *spots,
-                      size_t *count) {
+static void add_spots(const ov_judge *judge, const ovoid_mesh *mesh, const float *distance,
+                      double least, ov_spot *spots, size_t *count) {
+    bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (distance[v] >= least && ov_mesh_is_outer(mesh, v)) {
+        if (distance[v] >= least && counts(judge, mesh, v, &outer) && outer) {
             if (spots) {
                 ov_mesh_at(mesh, v, spots[*count].at);
                 spots[*count].distance = distance[v];
@@ -161,9 +192,8 @@ static bool has_near(const ov_grid *grid, const ov_spot *spots, const double at[
     return false;
 }
 
-/* Keeps the worst of each neighbourhood. */
-static ovoid_status thin_spots(ovoid_context *context, ov_spot *spots, size_t *count, double apart,
-                               size_t most) {
+ovoid_status ov_spots_thin(ovoid_context *context, ov_spot *spots, size_t *count, double apart,
+                           size_t most) {
     ovoid_status status = OVOID_OK;
     ov_grid grid = {0};
     size_t kept = 0;
@@ -187,12 +217,15 @@ cleanup:
     return status;
 }
 
-static void judge_distances(const ovoid_mesh *mesh, const float *distance,
+static void judge_distances(const ov_judge *judge, const ovoid_mesh *mesh, const float *distance,
                             ov_judgement *judgement) {
+    bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v) {
+        if (distance[v] <= judgement->deviation || !counts(judge, mesh, v, &outer))
+            continue; /* the deviation is never above the other */
         judgement->hausdorff = fmax(judgement->hausdorff, distance[v]);
-        if (ov_mesh_is_outer(mesh, v))
-            judgement->deviation = fmax(judgement->deviation, distance[v]);
+        if (outer)
+            judgement->deviation = distance[v];
     }
 }
 
@@ -253,8 +286,8 @@ static ovoid_status try_model(ov_judge *judge, const ov_quadric *quadrics, size_
         goto cleanup;
     *judgement =
         (ov_judgement){.valid = true, .area_error = NAN, .volume_ratio = NAN, .score = NAN};
-    judge_distances(judge->mesh, t->from_original, judgement);
-    judge_distances(t->mesh, t->from_model, judgement);
+    judge_distances(judge, judge->mesh, t->from_original, judgement);
+    judge_distances(judge, t->mesh, t->from_model, judgement);
 cleanup:
     return status;
 }
@@ -264,14 +297,14 @@ static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least,
                                   size_t most, ov_spot **spots, size_t *spot_count) {
     size_t room = 0;
     *spot_count = 0;
-    add_spots(judge->mesh, t->from_original, least, NULL, &room);
-    add_spots(t->mesh, t->from_model, least, NULL, &room);
+    add_spots(judge, judge->mesh, t->from_original, least, NULL, &room);
+    add_spots(judge, t->mesh, t->from_model, least, NULL, &room);
     *spots = ov_alloc(judge->context, room, sizeof **spots, "spots");
     if (!*spots)
         return OVOID_ERROR_MEMORY;
-    add_spots(judge->mesh, t->from_original, least, *spots, spot_count);
-    add_spots(t->mesh, t->from_model, least, *spots, spot_count);
-    return thin_spots(judge->context, *spots, spot_count, apart, most);
+    add_spots(judge, judge->mesh, t->from_original, least, *spots, spot_count);
+    add_spots(judge, t->mesh, t->from_model, least, *spots, spot_count);
+    return ov_spots_thin(judge->context, *spots, spot_count, apart, most);
 }
 
 ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
@@ -306,7 +339,7 @@ ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t 
     judgement->volume_ratio = content.volume / judge->content.volume;
     judgement->score = judgement->deviation +
                        SCORE_WHOLE * (judgement->hausdorff - judgement->deviation) +
-                       SCORE_AREA * judgement->area_error;
+                       (judge->in_region ? 0.0 : SCORE_AREA * judgement->area_error);
 cleanup:
     trial_destroy(&t);
     return status;

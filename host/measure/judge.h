@@ -8,6 +8,20 @@
 #include "measure/distance.h"
 #include "mesh/march.h"
 
+/* A place where an outer surface is far from the other surface. */
+typedef struct ov_spot {
+    double at[3];
+    double distance;
+} ov_spot;
+
+/* Whether a point is within `reach` of one of the spots. */
+bool ov_spots_near(const ov_spot *spots, size_t count, const double at[3], double reach);
+
+/* Keeps the worst of each neighbourhood, the worst first: none nearer to another than `apart`,
+ * `most` of them. */
+ovoid_status ov_spots_thin(ovoid_context *context, ov_spot *spots, size_t *count, double apart,
+                           size_t most);
+
 /* The original's surface, meshed once: a light mesh without normals, whose triangles stay on the
  * device. mesh is NULL where the field never reaches the isovalue. */
 typedef struct ov_judge {
@@ -20,9 +34,16 @@ typedef struct ov_judge {
     double root_2d; /* sqrt(2 decay), angstrom^-1 */
     ov_watch watch; /* asked during whatever takes long */
     ov_marcher *marcher;
-    ov_meter meter, back; /* of distances from the original, and to it */
-    ov_facets facets;     /* of the original */
-    ov_facets other;      /* of the model at hand */
+    ov_meter meter, back;   /* of distances from the original, and to it */
+    ov_facets facets;       /* of the original */
+    ov_facets other;        /* of the model at hand */
+    bool in_region;         /* set by the owner: only the surfaces within this box count, and not */
+    double low[3], high[3]; /* their areas: beyond it they may be cut off */
+    ov_spot *excused;       /* owned; within `excused_reach` of these it does not count either */
+    size_t excused_count;
+    double excused_reach;  /* angstrom */
+    const ov_spot *wanted; /* the owner's; so near to these it does, also in a cavity */
+    size_t wanted_count;
 } ov_judge;
 
 typedef struct ov_judgement {
@@ -33,12 +54,6 @@ typedef struct ov_judgement {
     double volume_ratio; /* the model's volume over the original's */
     double score;        /* what repairs make smaller: mostly the deviation, angstrom */
 } ov_judgement;
-
-/* A place where an outer surface is far from the other surface. */
-typedef struct ov_spot {
-    double at[3];
-    double distance;
-} ov_spot;
 
 ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
                              double isovalue, double spacing, ov_watch watch, ov_judge *judge);

@@ -508,6 +508,13 @@ static void integrate_bent(const bent_triangle *t, ov_content *content) {
     }
 }
 
+void ov_mesh_smooth_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
+                             ov_content *content) {
+    bent_triangle bent;
+    bend(mesh, triangle, origin, &bent);
+    integrate_bent(&bent, content);
+}
+
 ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
                              bool outer_only, ov_content *result) {
     ovoid_status status = OVOID_OK;

@@ -85,6 +85,11 @@ typedef struct ov_content {
 ov_content ov_mesh_flat(const ovoid_mesh *mesh, bool outer_only);
 ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only);
 
+/* Adds what one triangle has of the smooth ones, the volume as that between it and the origin. The
+ * mesh has its normals. */
+void ov_mesh_smooth_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
+                             ov_content *content);
+
 /* Either of them, asking on the way whether to go on. */
 ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
                              bool outer_only, ov_content *result);

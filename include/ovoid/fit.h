@@ -83,6 +83,28 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
     double mesh_spacing; /* of the meshes that surfaces are judged on, angstrom: 0.5 */
 } ovoid_adaptive_options;
 
+/* A molecule of more atoms than this is fitted in parts of at most so many, one after the other or
+ * side by side: memory follows what is under way, not the molecule. */
+#define OVOID_DEFAULT_WHOLE_ATOMS 65536
+#define OVOID_DEFAULT_PART_ATOMS 16384
+
+/* How method adaptive cuts a molecule into parts. A part is fitted among its neighbours, those that
+ * were fitted before as their ellipsoids and the others as their atoms, so that the goal holds
+ * across seams; no ellipsoid stands for atoms of two parts. The model depends on the parts, never
+ * on how many of them are fitted side by side. */
+typedef struct ovoid_parts_options { /* 24 bytes */
+    uint32_t atoms;  /* of a part at most, from OVOID_LEAST_PART_ATOMS; 0: OVOID_DEFAULT_PART_ATOMS
+                        in  a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */
+    uint32_t jobs;   /* parts side by side, each with a thread and a queue of its own, at most
+                        OVOID_MOST_JOBS; 0: 1 */
+    uint32_t resume; /* not 0: goes on where the checkpoint ends, if there is one */
+    const char *checkpoint; /* a file that gets each part as it is done, or NULL. It may not be
+                               there unless the fit resumes, and stays whatever comes of that */
+} ovoid_parts_options;
+
+#define OVOID_LEAST_PART_ATOMS 64
+#define OVOID_MOST_JOBS 64
+
 typedef struct ovoid_fit_options {
     size_t size;
     ovoid_method method;
@@ -94,6 +116,7 @@ typedef struct ovoid_fit_options {
                         field needs, if that is more */
     ovoid_adaptive_options adaptive;
     ovoid_l1_options l1;
+    ovoid_parts_options parts; /* of method adaptive */
 } ovoid_fit_options;
 
 /* Whether the goal of method adaptive was reached, and if not, why. */
@@ -148,6 +171,7 @@ typedef struct ovoid_fit_result {
     ovoid_adaptive_result adaptive; /* of method adaptive, else OVOID_UNKNOWN */
     uint64_t counts[OVOID_COUNTS];  /* by ovoid_count: what the fit made of them, of l1 without
                                        sampling */
+    uint64_t parts;                 /* that the molecule was cut into: 1 as a whole */
 } ovoid_fit_result;
 
 /* Nothing known; size is sizeof *result. */

@@ -9,7 +9,11 @@
 
 static bool report_sampling(uint64_t points, void *user) {
     ov_adaptive *const f = user;
-    const ovoid_progress progress = {.stage = "sample", .ellipsoids = f->atoms, .points = points};
+    const ovoid_progress progress = {.stage = "sample",
+                                     .done = f->around.done,
+                                     .total = f->around.total,
+                                     .ellipsoids = f->atoms,
+                                     .points = points};
     return ov_progress_report(f->context, &progress);
 }
 
@@ -21,15 +25,39 @@ static double default_spacing(size_t atoms, double decay) {
            fmin(1.0, sqrt(0.5 / decay));
 }
 
+double ov_surface_reach(const double *xyzr, size_t atoms, const ovoid_fit_options *options) {
+    double radius = 0.0;
+    for (size_t i = 0; i < atoms; ++i)
+        radius = fmax(radius, xyzr[4 * i + 3]);
+    return sqrt(fmax(radius * radius - log(options->isovalue) / options->decay, 0.0));
+}
+
 /* The room about the atom centres that the band takes, angstrom. */
 static double padding_of(const ov_adaptive *f) {
     const ovoid_fit_options *const options = f->options;
-    double radius = 0.0;
-    for (size_t i = 0; i < f->atoms; ++i)
-        radius = fmax(radius, f->xyzr[4 * i + 3]);
-    const double reach = radius * radius - log(options->isovalue) / options->decay;
-    return fmax(options->padding,
-                sqrt(fmax(reach, 0.0)) + ov_tuned.sample_padding / sqrt(2.0 * options->decay));
+    return fmax(options->padding, ov_surface_reach(f->xyzr, f->atoms, options) +
+                                      ov_tuned.sample_padding / sqrt(2.0 * options->decay));
+}
+
+/* What is fixed takes its share of the target. */
+static ovoid_status fix_surroundings(ov_adaptive *f) {
+    ovoid_status status = OVOID_OK;
+    const ov_points *const points = &f->samples.points;
+    ov_terms terms = {0};
+    ov_lists lists = {.packs_only = true};
+    ov_operations operations = {0};
+    ov_buffer values = {0};
+    OV_TRY(ov_terms_set(f->context, &terms, f->around.fixed, f->around.fixed_count, points->origin,
+                        OV_TARGET_CUTOFF));
+    OV_TRY(ov_lists_build(f->context, &lists, points, &terms, 0.0));
+    OV_TRY(ov_field(f->context, &operations, points, &terms, &lists, &values));
+    OV_TRY(ov_target_fix(f->context, &f->target, &values));
+cleanup:
+    ov_buffer_destroy(&values);
+    ov_operations_destroy(&operations);
+    ov_lists_destroy(&lists);
+    ov_terms_destroy(&terms);
+    return status;
 }
 
 static ovoid_status sample(ov_adaptive *f, const ov_target_options *targets) {
@@ -44,14 +72,57 @@ static ovoid_status sample(ov_adaptive *f, const ov_target_options *targets) {
     const ov_sampling sampling = {.go_on = report_sampling, .user = f};
     ov_lattice lattice;
     OV_TRY(ov_lattice_create(f->context, f->xyzr, f->atoms, f->spacing, padding_of(f), &lattice));
-    OV_TRY(ov_sample(f->context, f->xyzr, f->atoms, options->decay, &lattice, band, sampling,
-                     &f->samples));
+    OV_TRY(ov_sample(f->context, f->xyzr, f->atoms + f->around.atoms, options->decay, &lattice,
+                     band, sampling, &f->samples));
     OV_TRY(
         ov_target_create(f->context, &f->samples, options->decay, isovalue, targets, &f->target));
+    if (f->around.fixed_count > 0)
+        OV_TRY(fix_surroundings(f));
     ov_buffer_destroy(&f->samples.value); /* the target has taken over what it needs */
     ov_buffer_destroy(&f->samples.gradient);
 cleanup:
     return status;
+}
+
+/* What judges are not to look at: where a model that nothing is to be held against is off. */
+static ovoid_status excuse(ov_adaptive *f, size_t count) {
+    ovoid_status status = OVOID_OK;
+    ov_judge *const judge = &f->judge;
+    ov_judgement judgement;
+    size_t kept = 0;
+    count = ov_adaptive_surround(f, count);
+    OV_TRY(ov_judge_spots(judge, f->quadrics, count, f->options->adaptive.tolerance,
+                          ov_tuned.spots_apart, SIZE_MAX, &judgement, &judge->excused,
+                          &judge->excused_count));
+    for (size_t n = 0; n < judge->excused_count; ++n)
+        if (!ov_spots_near(judge->wanted, judge->wanted_count, judge->excused[n].at,
+                           2.0 * judge->excused_reach))
+            judge->excused[kept++] = judge->excused[n];
+    judge->excused_count = kept;
+cleanup:
+    return status;
+}
+
+/* Surfaces count where the part has a say in them. What is off with its own atoms as they are is
+ * none of its doing: cavities that are cut open at the end of what is about it, and what neighbours
+ * left. In a start that holds but for some spots, what else seems to be off does not count as a
+ * whole. */
+static ovoid_status judge_region(ov_adaptive *f) {
+    ov_judge *const judge = &f->judge;
+    const bool mends = f->around.spot_count > 0;
+    judge->in_region = true;
+    judge->excused_reach = ov_tuned.part_excused / judge->root_2d;
+    memcpy(judge->low, f->around.low, sizeof judge->low);
+    memcpy(judge->high, f->around.high, sizeof judge->high);
+    if (f->options->adaptive.goal != OVOID_GOAL_TOLERANCE)
+        return OVOID_OK;
+    if (mends)
+        memcpy(f->quadrics, f->start->quadrics, f->start->count * sizeof *f->quadrics);
+    for (size_t i = 0; i < f->atoms && !mends; ++i)
+        ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &f->quadrics[i]);
+    judge->wanted = f->around.spots;
+    judge->wanted_count = f->around.spot_count;
+    return excuse(f, mends ? f->start->count : f->atoms);
 }
 
 /* What all goals share, unless it is there. */
@@ -68,9 +139,11 @@ static ovoid_status prepare(ov_adaptive *f) {
     OV_TRY(sample(f, &targets));
     f->stage = "mesh";
     f->count = f->atoms;
-    OV_TRY(ov_judge_create(f->context, f->xyzr, f->atoms, options->decay, options->isovalue,
-                           options->adaptive.mesh_spacing,
+    OV_TRY(ov_judge_create(f->context, f->xyzr, f->atoms + f->around.atoms, options->decay,
+                           options->isovalue, options->adaptive.mesh_spacing,
                            (ov_watch){.go_on = ov_adaptive_report, .user = f}, &f->judge));
+    if (f->around.atoms > 0)
+        OV_TRY(judge_region(f));
     f->prepared = true;
 cleanup:
     return status;
@@ -90,7 +163,8 @@ static ovoid_status reach_goal(ov_adaptive *f, ov_trial *best) {
     case OVOID_GOAL_TOLERANCE:
         break;
     }
-    return ov_adaptive_tolerance(f, wanted->tolerance, best);
+    return f->around.spot_count > 0 ? ov_adaptive_mend(f, wanted->tolerance, best)
+                                    : ov_adaptive_tolerance(f, wanted->tolerance, best);
 }
 
 static void multiply_amplitudes(ov_adaptive *f, size_t count, double factor) {
@@ -106,12 +180,21 @@ static double log_calibration(const ov_adaptive *f, double volume_ratio, double 
     return fmin(fmax(step, -ov_tuned.volume_change), ov_tuned.volume_change);
 }
 
+static ovoid_status judge(ov_adaptive *f, size_t count, ov_judgement *judgement) {
+    const size_t all = ov_adaptive_surround(f, count);
+    return ov_judge_model(&f->judge, f->quadrics, all, judgement);
+}
+
 /* Distances only matter on the way where a tolerance may be lost. */
 static ovoid_status judge_volume(ov_adaptive *f, size_t count, ov_judgement *judgement) {
-    if (f->options->adaptive.goal == OVOID_GOAL_TOLERANCE)
-        return ov_judge_model(&f->judge, f->quadrics, count, judgement);
+    ovoid_status status = OVOID_OK;
     *judgement = (ov_judgement){.valid = true};
-    return ov_judge_volume(&f->judge, f->quadrics, count, &judgement->volume_ratio);
+    if (f->options->adaptive.goal == OVOID_GOAL_TOLERANCE)
+        OV_TRY(judge(f, count, judgement));
+    if (f->options->adaptive.goal != OVOID_GOAL_TOLERANCE || f->around.atoms > 0)
+        OV_TRY(ov_adaptive_volume(f, count, &judgement->volume_ratio));
+cleanup:
+    return status;
 }
 
 /* Makes the volumes equal by a factor of all amplitudes, unless that loses the tolerance. */
@@ -138,8 +221,8 @@ static ovoid_status calibrate(ov_adaptive *f, size_t count, ov_judgement *judgem
         if (lost)
             break;
     }
-    if (wanted->goal != OVOID_GOAL_TOLERANCE)
-        OV_TRY(ov_judge_model(&f->judge, f->quadrics, count, judgement));
+    if (wanted->goal != OVOID_GOAL_TOLERANCE && f->around.atoms == 0) /* a part is surveyed */
+        OV_TRY(judge(f, count, judgement));
 cleanup:
     return status;
 }
@@ -197,6 +280,7 @@ static void tell(const ov_adaptive *f, size_t count, const ov_judgement *judgeme
                  ovoid_fit_result *result) {
     result->spacing = f->spacing;
     result->points = f->samples.points.count;
+    result->parts = 1;
     result->ellipsoids = count;
     result->iterations = f->steps;
     result->adaptive.solver_iterations = ov_adaptive_solver_iterations(f) - f->solver_before;
@@ -235,8 +319,9 @@ void ov_found_destroy(ov_found *found) {
 
 /* ---- the whole ------------------------------------------------------------------------------ */
 
-ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size_t atoms, bool keep,
-                                ov_adaptive **adaptive) {
+ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size_t atoms,
+                                const ov_surroundings *around, bool keep, ov_adaptive **adaptive) {
+    size_t behind = 0;
     ov_adaptive *f = ov_alloc(context, 1, sizeof *f, "a fit");
     if (!f)
         return OVOID_ERROR_MEMORY;
@@ -247,7 +332,11 @@ ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size
                        .capacity = atoms + atoms / 4 + 2,
                        .refiner = {.context = context},
                        .local = {.refiner = {.context = context}}};
-    f->quadrics = ov_alloc(context, f->capacity, sizeof *f->quadrics, "ellipsoids");
+    if (around) {
+        f->around = *around;
+        behind = around->atoms > around->fixed_count ? around->atoms : around->fixed_count;
+    }
+    f->quadrics = ov_alloc(context, f->capacity + behind, sizeof *f->quadrics, "ellipsoids");
     f->twin = ov_alloc(context, f->capacity, sizeof *f->twin, "ellipsoids");
     f->parents = ov_alloc(context, 2 * f->capacity, sizeof *f->parents, "merges");
     if (!f->quadrics || !f->twin || !f->parents) {

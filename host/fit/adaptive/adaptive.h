@@ -4,6 +4,7 @@
 #define OV_ADAPTIVE_H
 
 #include "field/field.h"
+#include "measure/judge.h"
 
 /* A molecule as the method prepares it, once for all goals: the points about its surface, what a
  * model is held to there, its mesh, and how its atoms merge. */
@@ -21,15 +22,32 @@ typedef struct ov_found {
 
 void ov_found_destroy(ov_found *found);
 
-/* Prepares nothing yet. xyzr stays the caller's, to outlive it. keep: how atoms merge stays for the
- * next goal, too; as large as the molecule. */
-ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size_t atoms, bool keep,
-                                ov_adaptive **adaptive);
+/* Of a part of a molecule: what is about it and stays as it is. The caller's, to outlive the fit.
+ */
+typedef struct ov_surroundings {
+    size_t atoms; /* of others near it, which follow its own in xyzr */
+    const ov_quadric
+        *fixed; /* what stands for these in the model: their Gaussians, or ellipsoids */
+    size_t fixed_count;
+    double low[3], high[3]; /* the box in which surfaces are held to one another, angstrom */
+    const ov_spot
+        *spots;        /* where the start is off: it is mended there, cavities or not, and else */
+    size_t spot_count; /* stays as it is; 0: an ordinary search */
+    uint64_t done, total; /* parts, as the caller is told */
+} ov_surroundings;
+
+/* Prepares nothing yet. xyzr stays the caller's, to outlive it. around: NULL where the atoms are
+ * alone. keep: how atoms merge stays for the next goal, too; as large as the molecule. */
+ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size_t atoms,
+                                const ov_surroundings *around, bool keep, ov_adaptive **adaptive);
 void ov_adaptive_destroy(ov_adaptive **adaptive);
 
 /* Forgets what depends on where the atoms are: it is made anew by the next search. Buffers and
  * kernels stay. */
 void ov_adaptive_forget(ov_adaptive *adaptive);
+
+/* How far from an atom's centre its own Gaussian can reach the isovalue, at most, angstrom. */
+double ov_surface_reach(const double *xyzr, size_t atoms, const ovoid_fit_options *options);
 
 /* Whether `ellipsoids` of them can be asked for. */
 ovoid_status ov_adaptive_check(ovoid_context *context, const ovoid_adaptive_options *wanted,

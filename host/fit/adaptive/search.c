@@ -63,6 +63,8 @@ uint64_t ov_adaptive_solver_iterations(const ov_adaptive *f) {
 bool ov_adaptive_report(void *fit) {
     const ov_adaptive *const f = fit;
     const ovoid_progress progress = {.stage = f->stage,
+                                     .done = f->around.done,
+                                     .total = f->around.total,
                                      .iteration = f->steps,
                                      .ellipsoids = f->count,
                                      .points = f->samples.points.count,
@@ -83,6 +85,19 @@ static bool report_step(uint32_t step, double misfit, void *user) {
 void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t) {
     for (size_t i = 0; i < t->count; ++i)
         ov_factor_quadric(t->x + i * OV_FACTOR_PARAMETERS, &f->quadrics[i]);
+}
+
+size_t ov_adaptive_surround(ov_adaptive *f, size_t count) {
+    if (f->around.fixed_count > 0)
+        memcpy(f->quadrics + count, f->around.fixed, f->around.fixed_count * sizeof *f->quadrics);
+    return count + f->around.fixed_count;
+}
+
+ovoid_status ov_adaptive_volume(ov_adaptive *f, size_t count, double *ratio) {
+    const double *const others = f->xyzr + 4 * f->atoms;
+    for (size_t i = 0; i < f->around.atoms; ++i)
+        ov_quadric_of_atom(others + 4 * i, f->options->decay, &f->quadrics[count + i]);
+    return ov_judge_volume(&f->judge, f->quadrics, count + f->around.atoms, ratio);
 }
 
 static ov_refine_options refine_options(ov_adaptive *f, uint32_t steps, double decrease) {
@@ -137,7 +152,8 @@ ovoid_status ov_adaptive_share_atoms(ov_adaptive *f, ov_trial *t) {
 
 ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t) {
     ov_adaptive_quadrics(f, t);
-    return ov_judge_model(&f->judge, f->quadrics, t->count, &t->judgement);
+    const size_t count = ov_adaptive_surround(f, t->count);
+    return ov_judge_model(&f->judge, f->quadrics, count, &t->judgement);
 }
 
 ov_reduction_options ov_adaptive_merging(void) {
@@ -210,7 +226,7 @@ ovoid_status ov_adaptive_aim_at_volume(ov_adaptive *f, const ov_trial *t) {
     ovoid_status status = OVOID_OK;
     double ratio;
     ov_adaptive_quadrics(f, t);
-    OV_TRY(ov_judge_volume(&f->judge, f->quadrics, t->count, &ratio));
+    OV_TRY(ov_adaptive_volume(f, t->count, &ratio));
     OV_TRY(ov_target_scale(f->context, &f->target, ov_judge_amplitude_factor(&f->judge, ratio)));
 cleanup:
     return status;

@@ -20,8 +20,9 @@ enum { OV_STARTS = 6, OV_WINDOWS = 3 };
 
 struct ov_adaptive {
     ovoid_context *context;
-    const double *xyzr;
+    const double *xyzr; /* of the atoms, and then of those around */
     size_t atoms;
+    ov_surroundings around;           /* atoms 0: there is nothing */
     bool keep;                        /* the reductions */
     bool prepared;                    /* points, target and judge are there */
     const ovoid_fit_options *options; /* of this search */
@@ -42,10 +43,10 @@ struct ov_adaptive {
     uint64_t solver_before; /* iterations of conjugate gradients before this search */
     size_t count;           /* ellipsoids being worked on */
     double misfit;
-    size_t capacity; /* ellipsoids that the arrays below hold */
-    ov_quadric *quadrics;
-    uint32_t *twin;    /* of halves, as of ov_split_worst() */
-    uint32_t *parents; /* of merges, as of ov_merging */
+    size_t capacity;      /* ellipsoids that the arrays below hold */
+    ov_quadric *quadrics; /* and what is fixed behind them */
+    uint32_t *twin;       /* of halves, as of ov_split_worst() */
+    uint32_t *parents;    /* of merges, as of ov_merging */
     /* The best that held so far in this search, NULL: none did. A trial that is changed in place
      * only as long as each of its states holds. */
     const struct ov_trial *held;
@@ -74,6 +75,14 @@ void ov_trial_swap(ov_trial *a, ov_trial *b);
 
 /* Fills f->quadrics with the trial's ellipsoids. */
 void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t);
+
+/* Puts behind the first `count` of f->quadrics what is fixed around them, and returns how many
+ * there are then: a model as surfaces see it. */
+size_t ov_adaptive_surround(ov_adaptive *f, size_t count);
+
+/* The volume of the first `count` of f->quadrics over the original's, both among the atoms around
+ * them. What is fixed there has lost its place in f->quadrics. */
+ovoid_status ov_adaptive_volume(ov_adaptive *f, size_t count, double *ratio);
 
 /* At most `steps` of them, until two gain less than the share `decrease`. */
 ovoid_status ov_adaptive_refine(ov_adaptive *f, ov_trial *t, const char *stage, uint32_t steps,
@@ -124,5 +133,7 @@ ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size
 ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best);
 /* The fewest ellipsoids with a deviation of at most `tolerance` angstrom, or the best there is. */
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best);
+/* The start, with more ellipsoids where it is off. */
+ovoid_status ov_adaptive_mend(ov_adaptive *f, double tolerance, ov_trial *best);
 
 #endif

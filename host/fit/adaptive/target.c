@@ -35,12 +35,31 @@ static double root_weight(const ov_target *target, double phi, double slope) {
     return (options->floor + exp(-delta * delta)) / (slope * length);
 }
 
+static double fixed_at(const ov_target *target, size_t k) {
+    return target->fixed ? target->fixed[k] : 0.0;
+}
+
 static void set_bounds(ov_target *target, size_t k) {
     const double from = target->options.low * target->isovalue;
     const double to = target->options.high * target->isovalue;
-    const double phi = target->phi[k];
-    target->host_low[k] = phi > to ? (float)to : phi < from ? -FLT_MAX : (float)phi;
-    target->host_high[k] = phi > to ? FLT_MAX : phi < from ? (float)from : (float)phi;
+    const double phi = target->phi[k], fixed = fixed_at(target, k);
+    target->host_low[k] = phi > to     ? (float)(to - fixed)
+                          : phi < from ? -FLT_MAX
+                                       : (float)(phi - fixed);
+    target->host_high[k] = phi > to     ? FLT_MAX
+                           : phi < from ? (float)(from - fixed)
+                                        : (float)(phi - fixed);
+}
+
+static bool is_followed(const ov_target *target, size_t k) {
+    return target->host_low[k] == target->host_high[k];
+}
+
+/* Asks for `factor` phi at a point where phi is followed. */
+static void follow(ov_target *target, size_t k, double factor) {
+    if (is_followed(target, k))
+        target->host_low[k] = target->host_high[k] =
+            (float)(factor * target->phi[k] - fixed_at(target, k));
 }
 
 /* Reads phi and its slope at the points. */
@@ -128,12 +147,28 @@ cleanup:
     return status;
 }
 
+ovoid_status ov_target_fix(ovoid_context *context, ov_target *target, const ov_buffer *values) {
+    ovoid_status status = OVOID_OK;
+    const size_t count = target->points->packs * OV_PACK;
+    if (!target->fixed)
+        target->fixed = ov_alloc(context, count, sizeof *target->fixed, "values at points");
+    if (!target->fixed)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_buffer_read(context, values, 0, target->fixed, count * sizeof *target->fixed));
+    for (size_t k = 0; k < count; ++k)
+        if (!ov_points_fill(target->points, k))
+            set_bounds(target, k);
+    OV_TRY(ov_buffer_write(context, &target->low, 0, target->host_low, count * sizeof(float)));
+    OV_TRY(ov_buffer_write(context, &target->high, 0, target->host_high, count * sizeof(float)));
+cleanup:
+    return status;
+}
+
 ovoid_status ov_target_scale(ovoid_context *context, ov_target *target, double factor) {
     ovoid_status status = OVOID_OK;
     const size_t count = target->points->packs * OV_PACK;
     for (size_t k = 0; k < count; ++k)
-        if (target->host_low[k] == target->host_high[k])
-            target->host_low[k] = target->host_high[k] = (float)(factor * target->phi[k]);
+        follow(target, k, factor);
     OV_TRY(ov_buffer_write(context, &target->low, 0, target->host_low, count * sizeof(float)));
     OV_TRY(ov_buffer_write(context, &target->high, 0, target->host_high, count * sizeof(float)));
 cleanup:
@@ -145,8 +180,7 @@ cleanup:
  * the volume can do without it. */
 static void emphasise_point(ov_target *target, size_t k, float factor) {
     target->emphasis[k] = fminf(target->emphasis[k] * factor, (float)ov_tuned.spots_emphasis_max);
-    if (target->host_low[k] == target->host_high[k])
-        target->host_low[k] = target->host_high[k] = target->phi[k];
+    follow(target, k, 1.0);
 }
 
 /* Packs that places are near, with their points. */
@@ -252,5 +286,6 @@ void ov_target_destroy(ov_target *target) {
     free(target->host_weight);
     free(target->slope);
     free(target->phi);
+    free(target->fixed);
     memset(target, 0, sizeof *target);
 }

@@ -12,8 +12,9 @@ ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, si
                                ov_spots *spots) {
     ov_spots_destroy(spots);
     ov_adaptive_quadrics(f, t);
+    const size_t count = ov_adaptive_surround(f, t->count);
     const ovoid_status status =
-        ov_judge_spots(&f->judge, f->quadrics, t->count, tolerance, ov_tuned.spots_apart, most,
+        ov_judge_spots(&f->judge, f->quadrics, count, tolerance, ov_tuned.spots_apart, most,
                        &t->judgement, &spots->spot, &spots->count);
     if (status == OVOID_OK && (!t->judgement.valid || t->judgement.deviation <= tolerance))
         spots->count = 0;
@@ -121,5 +122,21 @@ ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *b
     OV_TRY(ov_owner_tidy(f->context, f->xyzr, f->atoms, f->quadrics, best->count,
                          ov_tuned.owner_share, ov_tuned.owner_reach, best->owner));
 cleanup:
+    return status;
+}
+
+ovoid_status ov_adaptive_mend(ov_adaptive *f, double tolerance, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    ov_spots spots = {0};
+    const ov_growing how = {.stage = "mend", .most = f->atoms, .rounds = ov_tuned.grow_rounds};
+    OV_TRY(ov_adaptive_take_start(f, best));
+    OV_TRY(ov_adaptive_spots(f, best, tolerance, f->capacity, &spots));
+    if (f->options->adaptive.steps > 0)
+        OV_TRY(ov_adaptive_grow(f, tolerance, &how, best, &spots));
+    ov_adaptive_quadrics(f, best);
+    OV_TRY(ov_owner_tidy(f->context, f->xyzr, f->atoms, f->quadrics, best->count,
+                         ov_tuned.owner_share, ov_tuned.owner_reach, best->owner));
+cleanup:
+    ov_spots_destroy(&spots);
     return status;
 }

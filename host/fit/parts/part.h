@@ -1,0 +1,50 @@
+/*
+ * The fit of one part of a molecule among its neighbours. What it comes to depends on these alone,
+ * never on what is under way elsewhere.
+ */
+#ifndef OV_FIT_PART_H
+#define OV_FIT_PART_H
+
+#include "fit/adaptive/adaptive.h"
+#include "fit/parts/partition.h"
+#include "measure/survey.h"
+
+/* What a part came to. found.owner: of its atoms in the partition's order. */
+typedef struct ov_part_fit {
+    ov_found found;
+    ovoid_fit_result result;
+} ov_part_fit;
+
+typedef struct ov_parts {
+    const double *xyzr;
+    size_t atoms;
+    const ovoid_fit_options *options;
+    double margin; /* angstrom: this far from the box of its centres a part's surface is judged, */
+    double reach;  /* and what is this far from it counts there */
+    ov_partition partition;
+    ov_part_fit *fit;   /* of each part */
+    size_t *ellipsoids; /* of each, where their number is what is asked for; else NULL */
+    ov_found model;     /* of all of them, when they are done */
+} ov_parts;
+
+/* Atom n of part p. */
+static inline const double *ov_part_atom(const ov_parts *parts, size_t p, size_t n) {
+    const ov_partition *const cut = &parts->partition;
+    return parts->xyzr + 4 * (size_t)cut->order[cut->part[p].first + n];
+}
+
+/* Fits part p from its atoms: neighbours of earlier colours are fixed as their ellipsoids, which
+ * they have got by then, the others as their atoms. `done` parts are, for whom the caller is told.
+ * On errors and when it is stopped *fit stays as it is. */
+ovoid_status ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p, size_t done,
+                               ov_part_fit *fit);
+
+/* Surveys its cell, when all parts are done. */
+ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_t p,
+                            ov_survey_cell *cell);
+
+/* The part's own atoms as they are: exact, and many. */
+ovoid_status ov_part_take_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
+                                ov_part_fit *fit);
+
+#endif

@@ -1,0 +1,349 @@
+#include "fit/parts/parts.h"
+
+#include "base/progress.h"
+#include "device/device.h"
+#include "fit/adaptive/constants.h"
+#include "fit/parts/checkpoint.h"
+#include "fit/parts/patch.h"
+#include "fit/parts/workers.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static size_t most_of(const ovoid_fit_options *options, size_t atoms) {
+    if (options->parts.atoms > 0)
+        return options->parts.atoms < atoms ? options->parts.atoms : atoms;
+    return atoms > OVOID_DEFAULT_WHOLE_ATOMS ? OVOID_DEFAULT_PART_ATOMS : atoms;
+}
+
+bool ov_parts_wanted(const ovoid_fit_options *options, size_t atoms) {
+    return most_of(options, atoms) < atoms || options->parts.checkpoint;
+}
+
+/* ---- how many of each ------------------------------------------------------------------------ */
+
+static size_t total_wanted(const ov_parts *parts) {
+    const ovoid_adaptive_options *const wanted = &parts->options->adaptive;
+    if (wanted->goal == OVOID_GOAL_ELLIPSOIDS)
+        return wanted->ellipsoids;
+    return (size_t)fmax(1.0, round(wanted->ratio * (double)parts->atoms));
+}
+
+/* Shares out a number of ellipsoids by atoms: what part p and those before it are to have is what
+ * their atoms' share of it rounds to. */
+static ovoid_status share_out(ovoid_context *context, ov_parts *parts) {
+    const size_t total = total_wanted(parts), count = parts->partition.count;
+    size_t before = 0, given = 0;
+    if (parts->options->adaptive.goal == OVOID_GOAL_TOLERANCE)
+        return OVOID_OK;
+    if (total < count)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "%zu ellipsoids cannot stand for %zu parts, of which each takes at least "
+                       "one; ask for more of them, or for larger parts (parts.atoms)",
+                       total, count);
+    parts->ellipsoids = ov_alloc(context, count, sizeof *parts->ellipsoids, "ellipsoids of parts");
+    if (!parts->ellipsoids)
+        return OVOID_ERROR_MEMORY;
+    for (size_t p = 0; p < count; ++p) {
+        const size_t left = count - 1 - p;
+        before += parts->partition.part[p].count;
+        size_t upto = (size_t)round((double)total * ((double)before / (double)parts->atoms));
+        upto = upto > given ? upto : given + 1;
+        upto = upto + left <= total ? upto : total - left;
+        parts->ellipsoids[p] = upto - given;
+        given = upto;
+    }
+    return OVOID_OK;
+}
+
+/* ---- what came of it ------------------------------------------------------------------------- */
+
+/* The ellipsoids of the parts one after the other, and the owners of all atoms. */
+static ovoid_status put_together(ovoid_context *context, ov_parts *parts) {
+    const ov_partition *const cut = &parts->partition;
+    ov_found made = {0};
+    size_t first = 0;
+    for (size_t p = 0; p < cut->count; ++p)
+        made.count += parts->fit[p].found.count;
+    made.quadrics = ov_alloc(context, made.count, sizeof *made.quadrics, "ellipsoids");
+    made.owner = ov_alloc(context, parts->atoms, sizeof *made.owner, "owners");
+    if (!made.quadrics || !made.owner) {
+        ov_found_destroy(&made);
+        return OVOID_ERROR_MEMORY;
+    }
+    for (size_t p = 0; p < cut->count; ++p) {
+        const ov_found *const own = &parts->fit[p].found;
+        memcpy(made.quadrics + first, own->quadrics, own->count * sizeof *own->quadrics);
+        for (size_t n = 0; n < cut->part[p].count; ++n)
+            made.owner[cut->order[cut->part[p].first + n]] = (uint32_t)first + own->owner[n];
+        first += own->count;
+        ov_found_destroy(&parts->fit[p].found); /* it is in the whole now */
+    }
+    if (parts->options->adaptive.goal == OVOID_GOAL_TOLERANCE) {
+        made.tolerance = parts->options->adaptive.tolerance;
+        made.fewest = made.count;
+    }
+    parts->model = made;
+    return OVOID_OK;
+}
+
+/* A part that takes no part in the surface is no failure. */
+static bool is_worse(ovoid_verdict verdict, ovoid_verdict than) {
+    return verdict != OVOID_VERDICT_NO_SURFACE &&
+           (than == OVOID_VERDICT_NO_SURFACE || (int)verdict > (int)than);
+}
+
+static void add_result(const ovoid_fit_result *one, ovoid_fit_result *all) {
+    all->spacing = one->spacing == one->spacing ? one->spacing : all->spacing;
+    all->ellipsoids += one->ellipsoids;
+    if (is_worse(one->verdict, all->verdict))
+        all->verdict = one->verdict;
+    if (one->points == OVOID_UNKNOWN)
+        return; /* the atoms themselves: nothing was done */
+    all->points += one->points;
+    all->iterations += one->iterations;
+    all->adaptive.solver_iterations += one->adaptive.solver_iterations;
+    all->distance = one->distance > all->distance || all->distance != all->distance ? one->distance
+                                                                                    : all->distance;
+    for (size_t n = 0; n < OVOID_COUNTS; ++n)
+        all->counts[n] += one->counts[n];
+}
+
+static void add_results(const ov_parts *parts, ovoid_fit_result *result) {
+    result->points = result->ellipsoids = result->iterations = 0;
+    result->adaptive.solver_iterations = 0;
+    result->distance = NAN;
+    result->verdict = OVOID_VERDICT_NO_SURFACE;
+    result->parts = parts->partition.count;
+    memset(result->counts, 0, sizeof result->counts);
+    for (size_t p = 0; p < parts->partition.count; ++p)
+        add_result(&parts->fit[p].result, result);
+    if (parts->ellipsoids && result->verdict != OVOID_VERDICT_MISSED)
+        result->verdict = OVOID_VERDICT_REACHED; /* so many were asked for */
+    result->reached = result->verdict == OVOID_VERDICT_REACHED;
+}
+
+/* What the last survey of all says takes the place of what each part said. */
+static void take_survey(const ov_parts *parts, const ov_survey_total *total,
+                        ovoid_fit_result *result) {
+    const ovoid_adaptive_options *const wanted = &parts->options->adaptive;
+    if (total->outer[0] == 0 || total->outer[1] == 0 || result->verdict == OVOID_VERDICT_COARSE)
+        return;
+    result->distance = total->deviation;
+    result->ellipsoids = parts->model.count;
+    if (wanted->goal == OVOID_GOAL_TOLERANCE)
+        result->verdict =
+            total->deviation <= wanted->tolerance ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
+    result->reached = result->verdict == OVOID_VERDICT_REACHED;
+}
+
+/* ---- fitting --------------------------------------------------------------------------------- */
+
+/* What the work on parts goes on with. */
+typedef struct job {
+    ov_parts *parts;
+    bool *todo;
+    ov_part_fit *fresh;                /* of each part, until it is committed */
+    ov_survey_cell *cell, *fresh_cell; /* likewise: what the last survey of each says */
+    ov_checkpoint file;
+    ov_survey_total total;
+} job;
+
+static size_t jobs_of(const ov_parts *parts) {
+    return parts->options->parts.jobs > 1 ? parts->options->parts.jobs : 1;
+}
+
+static ovoid_status fit_task(ovoid_context *context, size_t part, size_t done, void *user) {
+    job *const j = user;
+    return ov_part_fit_atoms(context, j->parts, part, done, &j->fresh[part]);
+}
+
+static ovoid_status fit_commit(ovoid_context *context, size_t part, void *user) {
+    job *const j = user;
+    if (j->file.file) {
+        const ovoid_status status =
+            ov_checkpoint_add(context, &j->file, j->parts, part, &j->fresh[part]);
+        if (status != OVOID_OK)
+            return status;
+    }
+    ov_found_destroy(&j->parts->fit[part].found);
+    j->parts->fit[part] = j->fresh[part];
+    j->fresh[part].found = (ov_found){0};
+    return OVOID_OK;
+}
+
+/* Each part from its atoms, in turn; those of the checkpoint are there. */
+static ovoid_status fit_all(ovoid_context *context, job *j) {
+    ovoid_status status = OVOID_OK;
+    const ov_partition *const cut = &j->parts->partition;
+    const ovoid_parts_options *const wanted = &j->parts->options->parts;
+    const ov_part_work work = {
+        .todo = j->todo, .in_turn = true, .task = fit_task, .commit = fit_commit, .user = j};
+    if (wanted->checkpoint)
+        OV_TRY(ov_checkpoint_open(context, wanted->checkpoint, wanted->resume != 0, j->parts,
+                                  j->todo, &j->file));
+    for (size_t p = 0; p < cut->count; ++p)
+        j->todo[p] = !j->todo[p]; /* what is not done */
+    OV_TRY(ov_parts_work(context, cut, jobs_of(j->parts), &work));
+cleanup:
+    ov_checkpoint_close(&j->file);
+    return status;
+}
+
+/* ---- what seams left ------------------------------------------------------------------------- */
+
+static ovoid_status survey_task(ovoid_context *context, size_t part, size_t done, void *user) {
+    job *const j = user;
+    (void)done;
+    return ov_part_survey(context, j->parts, part, &j->fresh_cell[part]);
+}
+
+static ovoid_status survey_commit(ovoid_context *context, size_t part, void *user) {
+    job *const j = user;
+    (void)context;
+    ov_survey_cell_destroy(&j->cell[part]);
+    j->cell[part] = j->fresh_cell[part];
+    j->fresh_cell[part] = (ov_survey_cell){0};
+    return OVOID_OK;
+}
+
+/* Surveys the cells of the parts in todo, and joins all. */
+static ovoid_status survey(ovoid_context *context, job *j) {
+    ovoid_status status = OVOID_OK;
+    const ov_partition *const cut = &j->parts->partition;
+    const ov_part_work work = {
+        .todo = j->todo, .task = survey_task, .commit = survey_commit, .user = j};
+    ov_progress_stage(context, "measure");
+    OV_TRY(ov_parts_work(context, cut, jobs_of(j->parts), &work));
+    ov_survey_total_destroy(&j->total);
+    OV_TRY(ov_survey_join(context, j->cell, cut->count, ov_tuned.spots_apart, &j->total));
+cleanup:
+    return status;
+}
+
+/* Chooses the parts in whose cells something may have changed with what is in these boxes. */
+static void choose_touched(job *j, const ov_box *touched, size_t count) {
+    const ov_partition *const cut = &j->parts->partition;
+    for (size_t p = 0; p < cut->count; ++p) {
+        j->todo[p] = false;
+        for (size_t n = 0; n < count && !j->todo[p]; ++n)
+            j->todo[p] = ov_boxes_near(&cut->part[p].cell, &touched[n], cut->near);
+    }
+}
+
+/* A part is held to the surface among what lies about it. Cavities of the model that open through a
+ * neck in another part are seen by a look at all of them, and are mended then. */
+static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    ov_box *touched = NULL;
+    size_t count = 0;
+    for (size_t p = 0; p < j->parts->partition.count; ++p)
+        j->todo[p] = true;
+    OV_TRY(survey(context, j));
+    for (uint32_t n = 0; n < ov_tuned.part_mends && j->total.spots > 0; ++n) {
+        free(touched);
+        touched = NULL;
+        OV_TRY(ov_patches_mend(context, j->parts, jobs_of(j->parts), j->total.spot, j->total.spots,
+                               &touched, &count, result));
+        choose_touched(j, touched, count);
+        OV_TRY(survey(context, j));
+    }
+cleanup:
+    free(touched);
+    return status;
+}
+
+/* ---- the whole ------------------------------------------------------------------------------- */
+
+static void destroy(ov_parts *parts, job *j) {
+    for (size_t p = 0; p < parts->partition.count; ++p) {
+        if (parts->fit)
+            ov_found_destroy(&parts->fit[p].found);
+        if (j->cell)
+            ov_survey_cell_destroy(&j->cell[p]);
+        if (j->fresh)
+            ov_found_destroy(&j->fresh[p].found);
+        if (j->fresh_cell)
+            ov_survey_cell_destroy(&j->fresh_cell[p]);
+    }
+    ov_survey_total_destroy(&j->total);
+    free(parts->fit);
+    free(j->cell);
+    ov_found_destroy(&parts->model);
+    free(parts->ellipsoids);
+    free(j->fresh);
+    free(j->fresh_cell);
+    free(j->todo);
+    ov_partition_destroy(&parts->partition);
+}
+
+static ovoid_status prepare(ovoid_context *context, ov_parts *parts, job *j) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_fit_options *const options = parts->options;
+    const double surface = ov_surface_reach(parts->xyzr, parts->atoms, options);
+    const double length = 1.0 / sqrt(2.0 * options->decay);
+    parts->margin = surface + ov_tuned.part_margin * length;
+    parts->reach = parts->margin + surface + ov_tuned.part_reach * length;
+    OV_TRY(ov_partition_create(context, parts->xyzr, parts->atoms, most_of(options, parts->atoms),
+                               parts->reach + ov_tuned.part_near * length, &parts->partition));
+    const size_t count = parts->partition.count;
+    OV_TRY(share_out(context, parts));
+    parts->fit = ov_alloc(context, count, sizeof *parts->fit, "parts of a molecule");
+    j->cell = ov_alloc(context, count, sizeof *j->cell, "parts of a molecule");
+    j->fresh = ov_alloc(context, count, sizeof *j->fresh, "parts of a molecule");
+    j->fresh_cell = ov_alloc(context, count, sizeof *j->fresh_cell, "parts of a molecule");
+    j->todo = ov_alloc(context, count, sizeof *j->todo, "parts of a molecule");
+    if (!parts->fit || !j->cell || !j->fresh || !j->fresh_cell || !j->todo)
+        status = OVOID_ERROR_MEMORY;
+cleanup:
+    return status;
+}
+
+static void hand_over(ov_parts *parts, ov_found *found) {
+    *found = parts->model;
+    parts->model = (ov_found){0};
+}
+
+/* What held when it was stopped: the parts that are done, and the others' atoms. */
+static void rescue(ovoid_context *context, ov_parts *parts, ov_found *found,
+                   ovoid_fit_result *result) {
+    size_t done = 0;
+    if (parts->model.count > 0) { /* all were done, and were being mended */
+        result->ellipsoids = parts->model.count;
+        hand_over(parts, found);
+        return;
+    }
+    for (size_t p = 0; p < parts->partition.count; ++p)
+        done += parts->fit[p].found.count > 0;
+    if (done == 0 || parts->options->adaptive.goal != OVOID_GOAL_TOLERANCE)
+        return;
+    for (size_t p = 0; p < parts->partition.count; ++p)
+        if (parts->fit[p].found.count == 0 &&
+            ov_part_take_atoms(context, parts, p, &parts->fit[p]) != OVOID_OK)
+            return;
+    add_results(parts, result);
+    if (put_together(context, parts) == OVOID_OK)
+        hand_over(parts, found);
+}
+
+ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t atoms,
+                            const ovoid_fit_options *options, double began, ov_found *found,
+                            ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    ov_parts parts = {.xyzr = xyzr, .atoms = atoms, .options = options};
+    job j = {.parts = &parts};
+    OV_TRY(prepare(context, &parts, &j));
+    result->sample_seconds = ov_seconds() - began;
+    OV_TRY(fit_all(context, &j));
+    add_results(&parts, result);
+    OV_TRY(put_together(context, &parts));
+    OV_TRY(mend_all(context, &j, result));
+    take_survey(&parts, &j.total, result);
+    hand_over(&parts, found);
+cleanup:
+    if (status == OVOID_ERROR_CANCELLED && parts.fit)
+        rescue(context, &parts, found, result);
+    destroy(&parts, &j);
+    return status;
+}

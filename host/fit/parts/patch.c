@@ -1,0 +1,296 @@
+#include "fit/parts/patch.h"
+
+#include "fit/adaptive/constants.h"
+#include "fit/parts/scene.h"
+#include "fit/parts/workers.h"
+#include "mesh/union.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Spots that are near each other, and what is fitted about them. */
+typedef struct patch {
+    ov_spot *spot;
+    size_t spots;
+    uint32_t *ellipsoid; /* of the model as it is when this patch has its turn */
+    size_t ellipsoids;
+    uint32_t *atom; /* those that the ellipsoids stand for */
+    size_t atoms;
+    ov_part_fit fit; /* what became of the ellipsoids; count 0: they stay */
+} patch;
+
+typedef struct patches {
+    ov_parts *parts;
+    patch *patch;
+    ov_partition cut; /* a part for each patch, with its box and its colour */
+    double reach;     /* angstrom: ellipsoids this near to a spot are in */
+    bool *todo;
+} patches;
+
+/* ---- which spots are one patch --------------------------------------------------------------- */
+
+static double distance(const double a[3], const double b[3]) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return sqrt(x * x + y * y + z * z);
+}
+
+static void grow_box(ov_box *box, const double at[3], double by) {
+    for (size_t k = 0; k < 3; ++k) {
+        box->low[k] = fmin(box->low[k], at[k] - by);
+        box->high[k] = fmax(box->high[k], at[k] + by);
+    }
+}
+
+/* Spots whose ellipsoids may be the same ones are of one patch: of[n] is the first of them. */
+static void unite_spots(const ov_spot *spots, size_t count, double apart, uint32_t *of) {
+    for (size_t n = 0; n < count; ++n)
+        of[n] = (uint32_t)n;
+    for (size_t n = 0; n < count; ++n)
+        for (size_t m = 0; m < n; ++m)
+            if (distance(spots[n].at, spots[m].at) < apart)
+                ov_unite(of, (uint32_t)n, (uint32_t)m);
+}
+
+static ovoid_status fill_patch(ovoid_context *context, patches *all, const ov_spot *spots,
+                               size_t count, const uint32_t *of, uint32_t which, size_t p) {
+    patch *const one = &all->patch[p];
+    ov_part *const part = &all->cut.part[p];
+    one->spot = ov_alloc(context, count, sizeof *one->spot, "spots");
+    if (!one->spot)
+        return OVOID_ERROR_MEMORY;
+    part->box = (ov_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (size_t n = 0; n < count; ++n)
+        if (of[n] == which) {
+            one->spot[one->spots++] = spots[n];
+            grow_box(&part->box, spots[n].at, all->reach);
+        }
+    return OVOID_OK;
+}
+
+static ovoid_status make_patches(ovoid_context *context, const ov_spot *spots, size_t count,
+                                 patches *all) {
+    ovoid_status status = OVOID_OK;
+    uint32_t *const of = ov_alloc(context, count, sizeof *of, "spots");
+    all->patch = ov_alloc(context, count, sizeof *all->patch, "spots");
+    all->cut.part = ov_alloc(context, count, sizeof *all->cut.part, "spots");
+    all->todo = ov_alloc(context, count, sizeof *all->todo, "spots");
+    if (!of || !all->patch || !all->cut.part || !all->todo) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    unite_spots(spots, count, 2.0 * all->reach, of);
+    for (size_t n = 0; n < count; ++n)
+        of[n] = ov_union_first(of, (uint32_t)n);
+    for (size_t n = 0; n < count; ++n)
+        if (of[n] == n)
+            OV_TRY(fill_patch(context, all, spots, count, of, (uint32_t)n, all->cut.count++));
+    OV_TRY(ov_partition_colour(context, &all->cut));
+cleanup:
+    free(of);
+    return status;
+}
+
+static void patches_destroy(patches *all) {
+    for (size_t p = 0; all->patch && p < all->cut.count; ++p) {
+        free(all->patch[p].spot);
+        free(all->patch[p].ellipsoid);
+        free(all->patch[p].atom);
+        ov_found_destroy(&all->patch[p].fit.found);
+    }
+    free(all->patch);
+    free(all->cut.part);
+    free(all->todo);
+}
+
+/* ---- what is fitted -------------------------------------------------------------------------- */
+
+static bool is_in(const patches *all, const patch *one, const ov_quadric *quadric) {
+    return ov_spots_near(one->spot, one->spots, quadric->centre, all->reach);
+}
+
+/* Marks the ellipsoids of a patch, and lists them and their atoms; place gets where in the list
+ * each is. */
+static ovoid_status list_patch(ovoid_context *context, const patches *all, patch *one, bool *chosen,
+                               uint32_t *place) {
+    const ov_found *const model = &all->parts->model;
+    for (size_t i = 0; i < model->count; ++i) {
+        chosen[i] = is_in(all, one, &model->quadrics[i]);
+        if (chosen[i])
+            place[i] = (uint32_t)one->ellipsoids++;
+    }
+    for (size_t a = 0; a < all->parts->atoms; ++a)
+        one->atoms += chosen[model->owner[a]];
+    one->ellipsoid = ov_alloc(context, one->ellipsoids, sizeof *one->ellipsoid, "ellipsoids");
+    one->atom = ov_alloc(context, one->atoms, sizeof *one->atom, "atoms");
+    if (!one->ellipsoid || !one->atom)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < model->count; ++i)
+        if (chosen[i])
+            one->ellipsoid[place[i]] = (uint32_t)i;
+    for (size_t a = 0, n = 0; a < all->parts->atoms; ++a)
+        if (chosen[model->owner[a]])
+            one->atom[n++] = (uint32_t)a;
+    return OVOID_OK;
+}
+
+/* The patch's ellipsoids as they are, and its atoms' owners among these. */
+static ovoid_status take_start(ovoid_context *context, const patches *all, const patch *one,
+                               const uint32_t *place, ov_found *start) {
+    const ov_found *const model = &all->parts->model;
+    *start = (ov_found){.count = one->ellipsoids};
+    start->quadrics = ov_alloc(context, one->ellipsoids, sizeof *start->quadrics, "ellipsoids");
+    start->owner = ov_alloc(context, one->atoms, sizeof *start->owner, "owners");
+    if (!start->quadrics || !start->owner)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < one->ellipsoids; ++i)
+        start->quadrics[i] = model->quadrics[one->ellipsoid[i]];
+    for (size_t n = 0; n < one->atoms; ++n)
+        start->owner[n] = place[model->owner[one->atom[n]]];
+    return OVOID_OK;
+}
+
+static ovoid_status fit_patch(ovoid_context *context, const patches *all, patch *one,
+                              const bool *chosen, const ov_found *start, size_t done) {
+    ovoid_status status = OVOID_OK;
+    const ov_parts *const parts = all->parts;
+    ov_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    ov_scene scene = {0};
+    ov_adaptive *adaptive = NULL;
+    for (size_t n = 0; n < one->atoms; ++n) {
+        const double *const atom = parts->xyzr + 4 * (size_t)one->atom[n];
+        grow_box(&box, atom, 0.0);
+        OV_TRY(ov_scene_add_atom(context, atom, &scene));
+    }
+    OV_TRY(ov_scene_about(context, parts, &box, chosen, &scene));
+    ov_surroundings around = ov_scene_surround(parts, &scene, one->atoms, &box, done);
+    around.total = all->cut.count;
+    around.spots = one->spot;
+    around.spot_count = one->spots;
+    OV_TRY(ov_adaptive_create(context, scene.xyzr, one->atoms, &around, false, &adaptive));
+    OV_TRY(ov_adaptive_reach(adaptive, parts->options, start, ov_seconds(), &one->fit.found,
+                             &one->fit.result));
+cleanup:
+    ov_adaptive_destroy(&adaptive);
+    ov_scene_destroy(&scene);
+    return status;
+}
+
+static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *user) {
+    ovoid_status status = OVOID_OK;
+    const patches *const all = user;
+    patch *const one = &all->patch[p];
+    const size_t count = all->parts->model.count;
+    ov_found start = {0};
+    bool *const chosen = ov_alloc(context, count, sizeof *chosen, "ellipsoids");
+    uint32_t *const place = ov_alloc(context, count, sizeof *place, "ellipsoids");
+    if (!chosen || !place) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    ovoid_fit_result_init(&one->fit.result, sizeof one->fit.result);
+    OV_TRY(list_patch(context, all, one, chosen, place));
+    if (one->atoms == 0)
+        goto cleanup;
+    OV_TRY(take_start(context, all, one, place, &start));
+    OV_TRY(fit_patch(context, all, one, chosen, &start, done));
+cleanup:
+    if (status == OVOID_ERROR_EMPTY)
+        status = OVOID_OK; /* nothing of the surface is there */
+    ov_found_destroy(&start);
+    free(chosen);
+    free(place);
+    return status;
+}
+
+/* ---- the model after it ---------------------------------------------------------------------- */
+
+/* The model's ellipsoids less those of the patches of a colour, and these patches' own behind them.
+ */
+static ovoid_status replace(ovoid_context *context, patches *all) {
+    ov_found *const model = &all->parts->model;
+    ov_found made = *model;
+    size_t kept = 0, room = model->count;
+    uint32_t *const moved = ov_alloc(context, model->count, sizeof *moved, "ellipsoids");
+    for (size_t p = 0; p < all->cut.count; ++p)
+        room += all->todo[p] ? all->patch[p].fit.found.count : 0;
+    made.quadrics = ov_alloc(context, room, sizeof *made.quadrics, "ellipsoids");
+    if (!moved || !made.quadrics) {
+        free(moved);
+        free(made.quadrics);
+        return OVOID_ERROR_MEMORY;
+    }
+    for (size_t p = 0; p < all->cut.count; ++p)
+        for (size_t i = 0;
+             all->todo[p] && all->patch[p].fit.found.count > 0 && i < all->patch[p].ellipsoids; ++i)
+            moved[all->patch[p].ellipsoid[i]] = UINT32_MAX;
+    for (size_t i = 0; i < model->count; ++i)
+        if (moved[i] != UINT32_MAX) {
+            made.quadrics[kept] = model->quadrics[i];
+            moved[i] = (uint32_t)kept++;
+        }
+    for (size_t a = 0; a < all->parts->atoms; ++a)
+        model->owner[a] = moved[model->owner[a]];
+    for (size_t p = 0; p < all->cut.count; ++p) {
+        const ov_found *const found = &all->patch[p].fit.found;
+        if (!all->todo[p] || found->count == 0)
+            continue;
+        for (size_t n = 0; n < all->patch[p].atoms; ++n)
+            model->owner[all->patch[p].atom[n]] = (uint32_t)kept + found->owner[n];
+        memcpy(made.quadrics + kept, found->quadrics, found->count * sizeof *found->quadrics);
+        kept += found->count;
+    }
+    free(model->quadrics);
+    model->quadrics = made.quadrics;
+    model->count = model->fewest = kept;
+    free(moved);
+    return OVOID_OK;
+}
+
+static void count_work(const patches *all, ovoid_fit_result *result) {
+    for (size_t p = 0; p < all->cut.count; ++p) {
+        const ovoid_fit_result *const one = &all->patch[p].fit.result;
+        if (!all->todo[p] || one->iterations == OVOID_UNKNOWN)
+            continue;
+        result->iterations += one->iterations;
+        result->adaptive.solver_iterations += one->adaptive.solver_iterations;
+        for (size_t n = 0; n < OVOID_COUNTS; ++n)
+            result->counts[n] += one->counts[n];
+    }
+}
+
+static ovoid_status tell_touched(ovoid_context *context, const patches *all, ov_box **touched,
+                                 size_t *count) {
+    *count = all->cut.count;
+    *touched = ov_alloc(context, *count, sizeof **touched, "patches");
+    if (!*touched)
+        return OVOID_ERROR_MEMORY;
+    for (size_t p = 0; p < *count; ++p)
+        (*touched)[p] = all->cut.part[p].box;
+    return OVOID_OK;
+}
+
+ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t jobs,
+                             const ov_spot *spots, size_t count, ov_box **touched,
+                             size_t *touched_count, ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    const double length = 1.0 / sqrt(2.0 * parts->options->decay);
+    patches all = {.parts = parts,
+                   .cut = {.near = 2.0 * parts->partition.near},
+                   .reach = ov_tuned.patch_reach * length};
+    const ov_part_work work = {.todo = NULL, .task = task, .user = &all};
+    OV_TRY(make_patches(context, spots, count, &all));
+    for (uint32_t colour = 0; colour < all.cut.colours; ++colour) {
+        ov_part_work now = work;
+        now.todo = all.todo;
+        for (size_t p = 0; p < all.cut.count; ++p)
+            all.todo[p] = all.cut.part[p].colour == colour;
+        OV_TRY(ov_parts_work(context, &all.cut, jobs, &now));
+        OV_TRY(replace(context, &all));
+        count_work(&all, result);
+    }
+    OV_TRY(tell_touched(context, &all, touched, touched_count));
+cleanup:
+    patches_destroy(&all);
+    return status;
+}

@@ -1,0 +1,26 @@
+/*
+ * Work on the parts of a molecule, one after the other or side by side: then by threads with a
+ * context and a queue each, on the device of the context that fits. Which one has which part, and
+ * when, changes nothing about what comes of it.
+ */
+#ifndef OV_FIT_WORKERS_H
+#define OV_FIT_WORKERS_H
+
+#include "fit/parts/partition.h"
+
+typedef struct ov_part_work {
+    const bool *todo; /* of each part, whether it is to be worked on; NULL: all are */
+    bool in_turn;     /* a part waits for those near it of earlier colours */
+    /* The work itself; `done` parts are. It may read what belongs to parts that it waited for, and
+     * changes nothing that others read. */
+    ovoid_status (*task)(ovoid_context *context, size_t part, size_t done, void *user);
+    /* Called after the task, for one part at a time: from then on others may read what it made. */
+    ovoid_status (*commit)(ovoid_context *context, size_t part, void *user);
+    void *user;
+} ov_part_work;
+
+/* The first failure ends it all. The caller's progress is asked on the caller's thread alone. */
+ovoid_status ov_parts_work(ovoid_context *context, const ov_partition *partition, size_t jobs,
+                           const ov_part_work *work);
+
+#endif

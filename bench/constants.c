@@ -2,17 +2,22 @@
  * bench/constants: what each number that steers a method does (host/fit/adaptive/constants.def,
  * host/fit/l1/constants.def): it is halved and doubled, one at a time, in fits of several kinds.
  *
- *   constants [--only PREFIX]... [--after NAME] MOLECULE...
+ *   constants [--only PREFIX]... [--record FILE] MOLECULE...
  *
  * Prints CSV: of every fit what it came to and what it took, counted, since that is the same on
- * every run; deviation inf where it came to nothing. --after goes on after a constant. The fits:
+ * every run; deviation inf where it came to nothing. --record goes on with a record that ended
+ * early: fits that the file has are left out, and so is the header. The fits:
+ *
  *   tolerance  to 0.5 angstrom
  *   number     half as many ellipsoids as that takes
  *   effort     the same with effort 2
- *   warm       from the model within the tolerance to 3/4 and to 3/2 of its ellipsoids, both
- * together frame      from that model to other coordinates of the atoms, within the tolerance l1
- * 300 iterations of method l1 A constant takes part where it is used. The rest of the library is as
- * it is; this program compiles the room `fit` for itself, with numbers that can be changed.
+ *   warm       from the model within the tolerance to 3/4 and to 3/2 of its ellipsoids, together
+ *   frame      to the tolerance, and in the same session to other coordinates of the atoms, which
+ *              alone counts
+ *   l1         300 iterations of method l1
+ *
+ * A constant takes part where it is used. The rest of the library is as it is; this program
+ * compiles the room `fit` for itself, with numbers that can be changed.
  */
 #include "fit/adaptive/constants.h"
 #include "fit/l1/constants.h"
@@ -104,6 +109,38 @@ typedef struct subject {
     double *moved;
     ovoid_model *model; /* within the tolerance, by the numbers as they are */
 } subject;
+
+/* What was recorded before, or NULL. */
+static char *record;
+
+static void read_record(const char *path) {
+    FILE *const file = fopen(path, "rb");
+    size_t length = 0;
+    if (!file) {
+        perror(path);
+        exit(1);
+    }
+    for (size_t more = 1; more > 0; length += more) {
+        record = realloc(record, length + (1 << 16) + 1);
+        if (!record)
+            exit(1);
+        more = fread(record + length, 1, 1 << 16, file);
+    }
+    fclose(file);
+    record[length] = '\0';
+    if (length > 0 && record[length - 1] != '\n') {
+        fprintf(stderr, "constants: %s ends within a line, which is to be taken out\n", path);
+        exit(1);
+    }
+}
+
+static bool is_recorded(const char *begin) {
+    const size_t length = strlen(begin);
+    for (const char *line = record; line && *line; line = strchr(line, '\n') + 1)
+        if (strncmp(line, begin, length) == 0)
+            return true;
+    return false;
+}
 
 typedef struct sums {
     uint64_t ellipsoids, steps, iterations, judgements, launches;
@@ -201,7 +238,7 @@ static void fit(subject *s, ovoid_fitter *fitter, fit_kind kind, sums *sum) {
         }
         return;
     case FRAME:
-        stop(s, ovoid_fitter_start_from(s->context, fitter, s->model));
+        reach(s, fitter, s->field, &options, NULL, &(sums){0});
         stop(s, ovoid_fitter_move(s->context, fitter, s->moved));
         reach(s, fitter, s->moved_field, &options, NULL, sum);
         return;
@@ -219,16 +256,24 @@ static void fit(subject *s, ovoid_fitter *fitter, fit_kind kind, sums *sum) {
 static void run(subject *s, fit_kind kind, const char *what, const char *value,
                 const char *change) {
     sums sum = {0};
+    char begin[256];
+    snprintf(begin, sizeof begin, "%s,%s,%s,%s,%s,", what, value, change, s->name,
+             kind_names[kind]);
+    const bool recorded = is_recorded(begin);
+    if (recorded && (kind != TOLERANCE || s->model)) /* the first fit makes the model for others */
+        return;
     ovoid_fitter *fitter = NULL;
     ovoid_fit_options options;
     ovoid_fit_options_init(&options, sizeof options);
     stop(s, ovoid_fitter_create(s->context, s->molecule, &options, &fitter));
     fit(s, fitter, kind, &sum);
     ovoid_fitter_destroy(&fitter);
-    printf("%s,%s,%s,%s,%s,%llu,%.4f,%.5f,%.5f,%llu,%llu,%llu,%llu\n", what, value, change, s->name,
-           kind_names[kind], (unsigned long long)sum.ellipsoids, sum.distance, sum.area_error,
-           sum.volume_error, (unsigned long long)sum.steps, (unsigned long long)sum.iterations,
-           (unsigned long long)sum.judgements, (unsigned long long)sum.launches);
+    if (recorded)
+        return;
+    printf("%s%llu,%.4f,%.5f,%.5f,%llu,%llu,%llu,%llu\n", begin, (unsigned long long)sum.ellipsoids,
+           sum.distance, sum.area_error, sum.volume_error, (unsigned long long)sum.steps,
+           (unsigned long long)sum.iterations, (unsigned long long)sum.judgements,
+           (unsigned long long)sum.launches);
     fflush(stdout);
 }
 
@@ -333,7 +378,7 @@ static const char *name_of(char *path) {
     return name;
 }
 
-static void try_all(ovoid_context *context, char *path, char **only, int count, const char *after) {
+static void try_all(ovoid_context *context, char *path, char **only, int count) {
     subject s = {.context = context, .name = path};
     stop(&s, ovoid_molecule_read(context, path, OVOID_MOLECULE_AUTO, &s.molecule));
     stop(&s, ovoid_field_of_molecule(context, s.molecule, OVOID_DEFAULT_DECAY,
@@ -342,12 +387,9 @@ static void try_all(ovoid_context *context, char *path, char **only, int count, 
     move(&s);
     for (fit_kind kind = 0; kind < KINDS; ++kind)
         run(&s, kind, "none", "", "");
-    for (const constant *c = constants; c < constants + CONSTANTS; ++c) {
-        if (!after && is_wanted(c->name, only, count))
+    for (const constant *c = constants; c < constants + CONSTANTS; ++c)
+        if (is_wanted(c->name, only, count))
             vary(&s, c);
-        if (after && strcmp(after, c->name) == 0)
-            after = NULL;
-    }
     ovoid_model_destroy(&s.model);
     ovoid_field_destroy(&s.field);
     ovoid_field_destroy(&s.moved_field);
@@ -358,25 +400,27 @@ static void try_all(ovoid_context *context, char *path, char **only, int count, 
 int main(int argc, char **argv) {
     ovoid_context *context = NULL;
     char *only[64];
-    const char *after = NULL;
     int count = 0, at = 1;
     for (; at + 1 < argc && strcmp(argv[at], "--only") == 0 && count < 64; at += 2)
         only[count++] = argv[at + 1];
-    if (at + 1 < argc && strcmp(argv[at], "--after") == 0) {
-        after = argv[at + 1];
+    if (at + 1 < argc && strcmp(argv[at], "--record") == 0) {
+        read_record(argv[at + 1]);
         at += 2;
     }
     if (at >= argc) {
-        fputs("usage: constants [--only PREFIX]... [--after NAME] MOLECULE...\n", stderr);
+        fputs("usage: constants [--only PREFIX]... [--record FILE] MOLECULE...\n", stderr);
         return 2;
     }
     const subject nobody = {.context = NULL};
     if (ovoid_context_create(&context) != OVOID_OK)
         stop(&nobody, OVOID_ERROR_MEMORY);
-    puts("constant,value,change,molecule,fit,ellipsoids,deviation,area_error,volume_error,steps,"
-         "solver_iterations,judgements,launches");
+    if (!record)
+        puts(
+            "constant,value,change,molecule,fit,ellipsoids,deviation,area_error,volume_error,steps,"
+            "solver_iterations,judgements,launches");
     for (; at < argc; ++at)
-        try_all(context, argv[at], only, count, after);
+        try_all(context, argv[at], only, count);
+    free(record);
     ovoid_context_destroy(&context);
     return 0;
 }

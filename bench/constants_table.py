@@ -45,7 +45,7 @@ def compare(rows, base):
     else:
         result = math.exp(sum(math.log(float(r["deviation"]) / float(b["deviation"]))
                               for r, b in good) / len(good))
-    took = math.exp(sum(math.log(int(r[work]) / int(b[work])) for r, b in good) / len(good))
+    took = math.exp(sum(math.log(max(1, int(r[work])) / max(1, int(b[work]))) for r, b in good) / len(good))
     return percent(result) + (f", {lost} fail" if lost else ""), percent(took)
 
 

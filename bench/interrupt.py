@@ -30,12 +30,13 @@ from common import find, short, write_table
 
 COLUMNS = "command stage signals largest_seconds median_seconds given_up codes files_left".split()
 PATIENCE = 0.5  # host/cli/interrupt.c
-STAGES = ("read open compile field mesh measure map render write sample sparse accuracy merge refine repair grow "
+STAGES = ("read open compile selftest field mesh measure map render write sample sparse accuracy merge refine repair grow "
           "shrink").split()
 
 # Name, arguments; MOLECULE and MODEL stand for the files.
 COMMANDS = (
     ("fit", "fit MOLECULE --ratio 0.066 --steps 3 -o a.ovoid --report a.json --trace a.csv --owners a.owners"),
+    ("fit tolerance", "fit MOLECULE --tolerance 2 -o a.ovoid"),
     ("fit l1", "fit MOLECULE --method l1 --iterations 30 --no-measure -o a.ovoid"),
     ("mesh obj", "mesh MOLECULE -o a.obj --spacing 0.4"),
     ("mesh ply", "mesh MODEL -o a.ply --spacing 0.5"),
@@ -45,6 +46,7 @@ COMMANDS = (
     ("render difference", "render MOLECULE MODEL -o a.png --view difference"),
     ("export map", "export MOLECULE -o a.mrc --spacing 1"),
     ("export dx", "export MODEL -o a.dx --spacing 1"),
+    ("export page", "export MOLECULE MODEL -o a.html"),
     ("export cxc", "export MODEL -o a.cxc"),
 )
 

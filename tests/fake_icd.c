@@ -81,11 +81,15 @@ static cl_int identity_info(cl_device_info what, size_t room, void *to, size_t *
     }
 }
 
+static bool is_silent(cl_device_id device, cl_device_info what);
+
 static cl_int CL_API_CALL device_info(cl_device_id device, cl_device_info what, size_t room,
                                       void *to, size_t *needed) {
     const cl_ulong memory = 1 << 20;
     const cl_uint zero = 0;
     const size_t group = 64;
+    if (is_silent(device, what))
+        return CL_OUT_OF_RESOURCES;
     switch (what) {
     case CL_DEVICE_NAME:
         return device->name ? give_text(device->name, room, to, needed) : CL_OUT_OF_RESOURCES;
@@ -150,11 +154,18 @@ static struct _cl_device_id fake_devices[] = {
      "cl_khr_icd cl_nv_device_attribute_query"},
 };
 
+enum { ALL = sizeof fake_devices / sizeof fake_devices[0] };
+
+static bool is_silent(cl_device_id device, cl_device_info what) {
+    const char *const silent = getenv("FAKE_SILENT");
+    return silent && device == &fake_devices[ALL - 1] && strtoul(silent, NULL, 0) == what;
+}
+
 static cl_int CL_API_CALL device_ids(cl_platform_id platform, cl_device_type type, cl_uint room,
                                      cl_device_id *ids, cl_uint *count) {
     const char *mode = getenv("FAKE_ICD");
     const bool gpu = mode && strcmp(mode, "gpu") == 0;
-    const cl_uint all = sizeof fake_devices / sizeof fake_devices[0] - (gpu ? 0 : 1);
+    const cl_uint all = ALL - (gpu ? 0 : 1);
     (void)platform, (void)type;
     if (mode && strcmp(mode, "fail") == 0)
         return CL_OUT_OF_RESOURCES;

@@ -14,7 +14,7 @@ static struct {
     bool armed, on;
     fault_kind kind;
     size_t at, calls;
-    const char *call[1 << 16]; /* names of the first ones */
+    const char *call[1 << 16]; /* what the first ones are */
     const char *failed[32];    /* names, each once, the first one first */
     int code;
     long objects, allocations;
@@ -63,13 +63,13 @@ long faults_allocations(void) {
     return faults.allocations;
 }
 
-/* Counts a call, and says whether it is to fail. */
-static bool fails(fault_kind kind, const char *name) {
+/* Counts a call, and says whether it is to fail. what: its name, or more exactly. */
+static bool fails_as(fault_kind kind, const char *name, const char *what) {
     if (!faults.armed || kind != faults.kind)
         return false;
     const size_t call = ++faults.calls;
     if (call <= sizeof faults.call / sizeof *faults.call)
-        faults.call[call - 1] = name;
+        faults.call[call - 1] = what;
     if (!faults.at || call < faults.at || (call > faults.at && !faults.on))
         return false;
     const char **place = faults.failed;
@@ -79,18 +79,26 @@ static bool fails(fault_kind kind, const char *name) {
     return true;
 }
 
+static bool fails(fault_kind kind, const char *name) {
+    return fails_as(kind, name, name);
+}
+
 /* ---- OpenCL ------------------------------------------------------------------------------- */
 
 #define NEXT(name) ((__typeof__(&(name)))(uintptr_t)dlsym(RTLD_NEXT, #name))
 
 /* What a failing call answers: in turn one code of either kind. */
-static cl_int refuse(const char *name) {
-    if (!fails(FAULT_OPENCL, name))
+static cl_int refuse_as(const char *name, const char *what) {
+    if (!fails_as(FAULT_OPENCL, name, what))
         return CL_SUCCESS;
     const cl_int code = faults.at % 2 ? CL_OUT_OF_RESOURCES : CL_OUT_OF_HOST_MEMORY;
     if (!faults.code)
         faults.code = code;
     return code;
+}
+
+static cl_int refuse(const char *name) {
+    return refuse_as(name, name);
 }
 
 /* A call that answers a code. */
@@ -100,10 +108,10 @@ static cl_int refuse(const char *name) {
         return code != CL_SUCCESS ? code : NEXT(name) arguments;                                   \
     }
 
-/* One that makes an event where it is asked to. */
+/* One that makes an event where it is asked to: with and without, they are two kinds of calls. */
 #define ENQUEUE(name, parameters, arguments)                                                       \
     cl_int CL_API_CALL name parameters {                                                           \
-        cl_int code = refuse(#name);                                                               \
+        cl_int code = refuse_as(#name, event ? #name " with an event" : #name);                    \
         if (code != CL_SUCCESS)                                                                    \
             return code;                                                                           \
         code = NEXT(name) arguments;                                                               \

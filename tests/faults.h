@@ -21,7 +21,8 @@ void faults_arm(fault_kind kind, size_t at, bool on);
 /* Nothing fails or is counted any more. Returns how many calls there were. */
 size_t faults_disarm(void);
 
-/* Which call was number `at` since faults_arm(), counted from 1; NULL for none. */
+/* What call number `at` was since faults_arm(), counted from 1: its name, and whether it was to
+ * make an event; NULL for none. */
 const char *faults_call(size_t at);
 
 /* The call that failed first since faults_arm(), NULL for none, and what it answered. */

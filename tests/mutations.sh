@@ -1,17 +1,17 @@
 #!/bin/sh
-# mutations.sh [PATTERN]
+# mutations.sh [--check] [PATTERN]
 # Breaks the code in one place at a time and runs the test that is to notice: a mutation that it
 # notices is killed, one that it does not survives, and asks for a better test. Works on a copy of
 # the checkout below $TMPDIR, for minutes. Only mutations whose line below matches PATTERN, if given.
 # Writes CSV to standard output (bench/results/mutations.csv); fails if any survives or no longer
-# applies.
+# applies. With --check it only says, at once, which do not change their file in one place.
 set -u
 cd "$(dirname "$0")/.." || exit 1
-copy=$(mktemp -d) || exit 1
-trap 'rm -rf "$copy"' EXIT INT TERM
-git ls-files -z | xargs -0 cp --parents -t "$copy" || exit 1
-cmake -S "$copy" -B "$copy/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DOVOID_BUILD_BENCH=OFF \
-    >/dev/null || exit 1
+check=
+if [ "${1:-}" = --check ]; then
+    check=1
+    shift
+fi
 
 # File, test, what is broken, and how: a program for sed. Tests run with OVOID_TEST_SMALL=1; an `+`
 # before a test asks for full size, a `@16` after it for a device whose groups hold 16 at most.
@@ -29,11 +29,12 @@ host/device/open.c|gram@64|waves of 64 are not filled|s/wave_of(device) >= WAVE 
 host/device/launch.c|device|groups are not fitted to the kernel|s/if (local > kernel->max_group)/if (false)/
 host/device/launch.c|device|any group for a kernel compiled for one|s/if (kernel->group \&\& local != kernel->group)/if (false)/
 host/device/launch.c|device|a write under way is not copied|/memcpy(copy, data, bytes);/d
-host/device/launch.c|faults|a read that failed counts as done|s/return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);/return OVOID_OK;/
+host/device/launch.c|faults|a read that failed counts as done|/buffer->memory, CL_TRUE,/,/clEnqueueReadBuffer/s/return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);/return OVOID_OK;/
+host/device/launch.c|faults|a later read that failed counts as done|/buffer->memory, CL_FALSE,/,/clEnqueueReadBuffer/s/return ov_cl_fail(context, code, "clEnqueueReadBuffer", NULL);/return OVOID_OK;/
 host/device/launch.c|faults|a write that failed counts as done|/bytes, copy ? copy : data, 0, NULL, NULL);/,/return ov_cl_fail/{/if (code/d;/return ov_cl_fail/d}
 host/device/program.c|faults|a kernel is lost where its limits are not told|s/^    clReleaseKernel(kernel->handle);$//
 host/device/error.c|faults|out of memory is any error|s/return code == CL_OUT_OF_HOST_MEMORY .*/return code == CL_SUCCESS/
-host/device/devices.c|faults|a device is what it did not say|s/return find_defect(entry);/find_defect(entry); return CL_SUCCESS;/
+host/device/devices.c|device|a device is what it did not say|s/return find_defect(entry);/find_defect(entry); return CL_SUCCESS;/
 host/molecule/sites.c|faults|out of memory is a bad selection|s/return \*error ? ov_fail/return true ? ov_fail/
 host/field/lists.c|l1_objective|lists cover a third of the skin|s|(skin + (double)points->rounding)|(skin / 3.0 + (double)points->rounding)|
 host/fit/adaptive/solver.c|solver|the tolerance of conjugate gradients|s/(cl_float)(tolerance \* tolerance)/(cl_float)(1e4 * tolerance)/
@@ -79,6 +80,33 @@ try() {
     echo "$file,$test,$what,$outcome"
 }
 
+# Prints and returns whether a mutation still applies, in the checkout itself.
+check() {
+    file=$1 what=$3 program=$4
+    places=$(sed "$program" "$file" | diff "$file" - | grep -c '^[0-9]')
+    [ "$places" = 1 ] && return
+    echo "$file: \"$what\" changes $places places"
+    return 1
+}
+
+if [ "$check" ]; then
+    mutations | grep -e "${1:-.}" | {
+        fault=0 count=0
+        while IFS='|' read -r file test what program; do
+            check "$file" "$test" "$what" "$program" || fault=1
+            count=$((count + 1))
+        done
+        echo "$count mutations"
+        [ "$count" -gt 0 ] && exit "$fault"
+    }
+    exit
+fi
+
+copy=$(mktemp -d) || exit 1
+trap 'rm -rf "$copy"' EXIT INT TERM
+git ls-files -z | xargs -0 cp --parents -t "$copy" || exit 1
+cmake -S "$copy" -B "$copy/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DOVOID_BUILD_BENCH=OFF \
+    >/dev/null || exit 1
 echo "file,test,mutation,outcome"
 ninja -C "$copy/build" wave64 >/dev/null || exit 1
 mutations | grep -e "${1:-.}" | while IFS='|' read -r file test what program; do

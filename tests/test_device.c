@@ -1234,6 +1234,28 @@ static void test_defective_devices(void **state) {
     }
 }
 
+/* Without an answer to what decides on the use of a device, it is not there: of two that would do,
+ * the GPU is not taken, and not counted. */
+static void test_silent_devices(void **state) {
+    (void)state;
+    skip_on("Oclgrind", "it stands in for the loader");
+    static const cl_device_info needed[] = {
+        CL_DEVICE_TYPE,      CL_DEVICE_NAME,
+        CL_DEVICE_VERSION,   CL_DEVICE_PREFERRED_VECTOR_WIDTH_FLOAT,
+        CL_DEVICE_AVAILABLE, CL_DEVICE_COMPILER_AVAILABLE,
+    };
+    bool pocl;
+    const char *vendors = fake_vendors(&pocl);
+    for (size_t k = 0; k < sizeof needed / sizeof *needed; k++) {
+        char silent[32], *text;
+        snprintf(silent, sizeof silent, "FAKE_SILENT=0x%x", (unsigned)needed[k]);
+        text = CHILD("fake", vendors, "FAKE_ICD=gpu", silent);
+        assert_contains(text, "CL_OUT_OF_HOST_MEMORY (-6), device Fake Full 4090");
+        assert_lacks(text, "Fake Screen");
+        free(text);
+    }
+}
+
 /* Addresses, UUIDs and lists, of devices of which two tell: "Fake Full 4090" by Khronos's
  * extensions, "Fake Screen" by NVIDIA's. */
 static void test_identities(void **state) {
@@ -1382,6 +1404,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test_setup(test_no_platform, clear_environment),
         cmocka_unit_test_setup(test_failing_platform, clear_environment),
         cmocka_unit_test_setup(test_defective_devices, clear_environment),
+        cmocka_unit_test_setup(test_silent_devices, clear_environment),
         cmocka_unit_test_setup(test_identities, clear_environment),
         cmocka_unit_test_setup(test_pocl_cache, clear_environment),
         cmocka_unit_test_setup(test_private_folder, clear_environment),

@@ -2,6 +2,7 @@
  * The two lists that pair terms with packs, against the exact least exponent over every pack's box.
  */
 #include "model/ellipsoid.h"
+#include "selftest/check.h"
 #include "support.h"
 
 /* The lists, on the host. */
@@ -41,25 +42,13 @@ static void expect_csr(const uint32_t *start, const uint32_t *item, size_t count
     }
 }
 
-static bool holds(const uint32_t *start, const uint32_t *item, size_t list, uint32_t value) {
-    uint32_t low = start[list], high = start[list + 1];
-    while (low < high) {
-        const uint32_t middle = low + (high - low) / 2;
-        if (item[middle] < value)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < start[list + 1] && item[low] == value;
-}
-
 /* Both lists are in order and each the transpose of the other. */
 static void expect_lists(const pairs *p) {
     expect_csr(p->term_start, p->term_item, p->terms, p->items, p->packs);
     expect_csr(p->pack_start, p->pack_item, p->packs, p->items, p->terms);
     for (size_t i = 0; i < p->terms; ++i)
         for (uint32_t k = p->term_start[i]; k < p->term_start[i + 1]; ++k)
-            assert_true(holds(p->pack_start, p->pack_item, p->term_item[k], (uint32_t)i));
+            assert_true(ov_list_holds(p->pack_start, p->pack_item, p->term_item[k], (uint32_t)i));
 }
 
 static void pack_box(const bench *b, size_t pack, double skin, double box[6]) {
@@ -88,7 +77,7 @@ static void expect_pairs(const bench *b, const pairs *p, double cutoff, double s
             double box[6];
             pack_box(b, pack, skin, box);
             const double least = ov_twin_least_exponent(&b->quadrics[i], box);
-            const bool listed = holds(p->term_start, p->term_item, i, (uint32_t)pack);
+            const bool listed = ov_list_holds(p->term_start, p->term_item, i, (uint32_t)pack);
             if (least <= reach - 1e-3 && !listed)
                 fail_msg("term %zu, pack %zu: least exponent %g, reach %g, not listed", i, pack,
                          least, reach);
@@ -259,7 +248,7 @@ static void terms_below_the_cut_off(void **state) {
     read_pairs(*state, &b.lists, &p);
     expect_lists(&p);
     assert_int_equal(p.items, 1);
-    assert_true(holds(p.term_start, p.term_item, 1, 0));
+    assert_true(ov_list_holds(p.term_start, p.term_item, 1, 0));
     free_pairs(&p);
     bench_destroy(&b);
 }
@@ -516,7 +505,7 @@ static void lists_are_sorted_on_the_device(void **state) {
     expect_csr(starts, items, PACKS, expected, LENGTH);
     for (size_t pack = 0; pack < PACKS; ++pack)
         for (uint32_t i = 0; i < LENGTH; ++i)
-            assert_true(holds(starts, items, pack, i) == paired[pack][i]);
+            assert_true(ov_list_holds(starts, items, pack, i) == paired[pack][i]);
     free(starts);
     free(items);
     ov_kernel_destroy(&lists);

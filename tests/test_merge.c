@@ -5,6 +5,7 @@
 #include "fit/adaptive/merge.h"
 #include "mixture/component.h"
 #include "model/ellipsoid.h"
+#include "selftest/losses.h"
 #include "support.h"
 
 enum { P = OV_FACTOR_PARAMETERS };
@@ -13,111 +14,7 @@ static double value_of(const ov_quadric *quadric, const double y[3]) {
     return quadric->amplitude * exp(-ov_twin_exponent(quadric, y));
 }
 
-static double square_residual(double value, double low, double high) {
-    const double r = value - fmin(fmax(value, low), high);
-    return r * r;
-}
-
-static bool merge_quadrics(const ov_quadric *a, const ov_quadric *b, ov_quadric *merged) {
-    ov_component p, q, both;
-    if (!ov_component_of_quadric(a, &p) || !ov_component_of_quadric(b, &q))
-        return false;
-    ov_component_merge(&p, &q, &both);
-    ov_quadric_of_component(&both, merged);
-    return true;
-}
-
 /* ---- the kernel --------------------------------------------------------------------------- */
-
-/* Bounds, weights and values at a bench's points, in the order of the packs. */
-typedef struct charges {
-    float *value, *low, *high, *weight;
-} charges;
-
-static void make_charges(const bench *b, test_random *random, charges *c) {
-    const size_t all = b->points.packs * OV_PACK;
-    c->value = test_alloc(all, sizeof *c->value);
-    c->low = test_alloc(all, sizeof *c->low);
-    c->high = test_alloc(all, sizeof *c->high);
-    c->weight = test_alloc(all, sizeof *c->weight);
-    for (size_t k = 0; k < b->count; ++k) {
-        const double phi = ov_twin_field(b->quadrics, b->terms_count, b->xyz + 3 * k).value;
-        c->value[k] = (float)phi;
-        c->low[k] = c->high[k] = (float)(phi * random_uniform(random, 0.7, 1.3));
-        if (k % 3 == 0)
-            c->high[k] = FLT_MAX;
-        if (k % 3 == 1)
-            c->low[k] = -FLT_MAX;
-        c->weight[k] = (float)random_uniform(random, 0.0, 2.0);
-    }
-}
-
-static void destroy_charges(charges *c) {
-    free(c->value);
-    free(c->low);
-    free(c->high);
-    free(c->weight);
-}
-
-static float *run_losses(bench *b, const charges *c, const uint32_t *pairs,
-                         const ov_quadric *merged, size_t count) {
-    ovoid_context *const context = b->context;
-    const double origin[3] = {0};
-    const size_t all = b->points.packs * OV_PACK;
-    const cl_uint pairs_count = (cl_uint)count;
-    ov_kernel kernel = {0};
-    ov_terms terms = {0};
-    ov_buffer value = {0}, low = {0}, high = {0}, weight = {0}, list = {0}, loss = {0};
-    ov_device *device;
-    test_check(context, ov_device_get(context, &device));
-    test_check(context, ov_kernel_create(context, "merge", "merge_loss", &kernel));
-    test_check(context, ov_terms_set(context, &terms, merged, count, origin, 1e-37));
-    write_floats(context, &value, c->value, all);
-    write_floats(context, &low, c->low, all);
-    write_floats(context, &high, c->high, all);
-    write_floats(context, &weight, c->weight, all);
-    test_check(context, ov_buffer_reserve(context, &list, 2 * count * sizeof *pairs, "pairs"));
-    test_check(context, ov_buffer_write(context, &list, 0, pairs, 2 * count * sizeof *pairs));
-    test_check(context, ov_buffer_reserve(context, &loss, count * sizeof(float), "losses"));
-    const size_t lanes = device->shape.lanes;
-    test_check(context,
-               OV_LAUNCH(context, &kernel, count * lanes, device->team, OV_ARG(pairs_count),
-                         OV_ARG(list.memory), OV_ARG(terms.device.memory),
-                         OV_ARG(b->points.xyz.memory), OV_ARG(b->points.pack_origins.memory),
-                         OV_ARG(value.memory), OV_ARG(low.memory), OV_ARG(high.memory),
-                         OV_ARG(weight.memory), OV_ARG(b->lists.term_start.memory),
-                         OV_ARG(b->lists.term_item.memory), OV_ARG(b->terms.device.memory),
-                         OV_ARG(loss.memory)));
-    float *const result = read_floats(context, &loss, count);
-    ov_buffer *const buffers[] = {&value, &low, &high, &weight, &list, &loss};
-    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
-        ov_buffer_destroy(buffers[k]);
-    ov_terms_destroy(&terms);
-    ov_kernel_destroy(&kernel);
-    return result;
-}
-
-/* The loss over the points of the packs in `counted`, every one if that is NULL. */
-static ov_twin_sum twin_loss(const bench *b, const charges *c, uint32_t i, uint32_t j,
-                             const ov_quadric *merged, const bool *counted) {
-    ov_twin_sum sum = {0};
-    for (size_t k = 0; k < b->count; ++k) {
-        if (counted && !counted[k / OV_PACK])
-            continue;
-        const double *const y = b->xyz + 3 * k;
-        const ov_twin_sum ei = ov_twin_field(&b->quadrics[i], 1, y),
-                          ej = ov_twin_field(&b->quadrics[j], 1, y),
-                          em = ov_twin_field(merged, 1, y);
-        const double before = c->value[k], after = before - ei.value - ej.value + em.value;
-        const double a = square_residual(after, c->low[k], c->high[k]),
-                     s = square_residual(before, c->low[k], c->high[k]);
-        sum.value += c->weight[k] * (a - s);
-        sum.scale +=
-            c->weight[k] *
-            (a + s + 2.0 * sqrt(a) * (ei.scale + ej.scale + em.scale + 2.0 * fabs(before)));
-    }
-    return sum;
-}
 
 /* All pairs of neighbours in the list of terms, and some of one term with the last. */
 static size_t make_pairs(const bench *b, uint32_t *pairs, ov_quadric *merged) {
@@ -127,7 +24,8 @@ static size_t make_pairs(const bench *b, uint32_t *pairs, ov_quadric *merged) {
             const uint32_t j = far ? (uint32_t)b->terms_count - 1 : i + 1;
             pairs[2 * count] = i;
             pairs[2 * count + 1] = j;
-            assert_true(merge_quadrics(&b->quadrics[i], &b->quadrics[j], &merged[count]));
+            test_check(b->context, ov_merge_quadrics(b->context, &b->quadrics[i], &b->quadrics[j],
+                                                     &merged[count]));
             ++count;
         }
     return count;
@@ -147,18 +45,20 @@ static bool *packs_of_pair(const bench *b, const uint32_t pair[2]) {
 }
 
 static void expect_losses(bench *b, uint64_t seed, bool every_point, const char *what) {
-    test_random random = {seed};
-    charges c;
+    ov_charges c;
+    float *loss = NULL;
     double worst = 0.0;
     uint32_t *const pairs = test_alloc(4 * b->terms_count, sizeof *pairs);
     ov_quadric *const merged = test_alloc(2 * b->terms_count, sizeof *merged);
-    make_charges(b, &random, &c);
+    test_check(b->context, ov_charges_create(b->context, b->quadrics, b->terms_count, &b->points,
+                                             b->xyz, seed, &c));
     const size_t count = make_pairs(b, pairs, merged);
-    float *const loss = run_losses(b, &c, pairs, merged, count);
+    test_check(b->context, ov_losses(b->context, &b->points, &b->terms, &b->lists, &c, pairs,
+                                     merged, count, &loss));
     for (size_t n = 0; n < count; ++n) {
         bool *const listed = packs_of_pair(b, pairs + 2 * n);
-        const ov_twin_sum wanted = twin_loss(b, &c, pairs[2 * n], pairs[2 * n + 1], &merged[n],
-                                             every_point ? NULL : listed);
+        const ov_twin_sum wanted = ov_twin_loss(b->quadrics, pairs + 2 * n, &merged[n], b->xyz,
+                                                b->count, &c, every_point ? NULL : listed);
         expect_close(loss[n], wanted, 2.0, &worst, "loss", n);
         free(listed);
     }
@@ -166,7 +66,7 @@ static void expect_losses(bench *b, uint64_t seed, bool every_point, const char 
     free(loss);
     free(pairs);
     free(merged);
-    destroy_charges(&c);
+    ov_charges_destroy(&c);
 }
 
 static void losses_equal_twin(void **state) {
@@ -399,14 +299,14 @@ static double model_loss(const model *m, const double *x, size_t count, size_t i
     double loss = 0.0;
     for (size_t n = 0; n < count; ++n)
         ov_factor_quadric(x + n * P, &quadrics[n]);
-    assert_true(merge_quadrics(&quadrics[i], &quadrics[j], &merged));
+    test_check(m->context, ov_merge_quadrics(m->context, &quadrics[i], &quadrics[j], &merged));
     for (size_t k = 0; k < m->points; ++k) {
         const double *const y = m->xyz + 3 * k;
         const double before = ov_twin_field(quadrics, count, y).value;
         const double after =
             before - value_of(&quadrics[i], y) - value_of(&quadrics[j], y) + value_of(&merged, y);
-        loss += m->weight[k] * (square_residual(after, m->low[k], m->high[k]) -
-                                square_residual(before, m->low[k], m->high[k]));
+        loss += m->weight[k] * (ov_twin_square_residual(after, m->low[k], m->high[k]) -
+                                ov_twin_square_residual(before, m->low[k], m->high[k]));
     }
     free(quadrics);
     return loss;
@@ -493,7 +393,7 @@ static void parents_are_named(void **state) {
         ov_factor_quadric(m.x + a * P, &one);
         ov_factor_quadric(m.x + b * P, &two);
         ov_factor_quadric(x + i * P, &got);
-        assert_true(merge_quadrics(&one, &two, &both));
+        test_check(NULL, ov_merge_quadrics(NULL, &one, &two, &both));
         expect_near(got.amplitude, both.amplitude, 1e-6 * both.amplitude, "an amplitude");
         for (int k = 0; k < 3; ++k)
             expect_near(got.centre[k], both.centre[k], 1e-6, "a centre");
@@ -625,7 +525,7 @@ static double twin_share(const model *m, const ov_quadric *quadrics, size_t i) {
     for (size_t k = 0; k < m->points; ++k) {
         const double *const y = m->xyz + 3 * k;
         const double phi = ov_twin_field(quadrics, m->count, y).value;
-        share += m->weight[k] * square_residual(phi, m->low[k], m->high[k]) *
+        share += m->weight[k] * ov_twin_square_residual(phi, m->low[k], m->high[k]) *
                  value_of(&quadrics[i], y) / fmax(phi, 1e-3);
     }
     return share;

@@ -611,6 +611,56 @@ static void a_search_asks_so_many_and_no_more(void **state) {
     }
 }
 
+static uint32_t nearest_of_all(const double (*points)[3], size_t count, const double at[3],
+                               double *distance) {
+    uint32_t best = OV_NOBODY;
+    double least = INFINITY;
+    for (size_t k = 0; k < count; ++k) {
+        const double x = points[k][0] - at[0], y = points[k][1] - at[1], z = points[k][2] - at[2];
+        const double square = x * x + y * y + z * z;
+        if (square < least) {
+            least = square;
+            best = (uint32_t)k;
+        }
+    }
+    *distance = sqrt(least);
+    return best;
+}
+
+/* The nearest of a cloud, of a lattice where many are as near, and of a crowd. */
+static void the_nearest_is_found(void **state) {
+    enum { POINTS = 9000 };
+    const double reach = 1.5;
+    test_random random = {17};
+    double(*const points)[3] = test_alloc(POINTS, sizeof *points);
+    for (int kind = 0; kind < 3; ++kind) {
+        ov_grid grid = {0};
+        size_t none = 0;
+        for (size_t k = 0; k < 3 * POINTS; ++k) {
+            const double x = random_uniform(&random, -12.0, 12.0);
+            points[k / 3][k % 3] = kind == 0 ? x : kind == 1 ? round(x) : 1e-3 * x;
+        }
+        test_check(*state, ov_grid_of(*state, points[0], sizeof *points, POINTS, reach, &grid));
+        for (size_t n = 0; n < 300; ++n) {
+            const double scale = kind == 2 ? 0.1 : 1.2;
+            double at[3], distance;
+            for (int k = 0; k < 3; ++k) {
+                at[k] = scale * random_uniform(&random, -12.0, 12.0);
+                at[k] = kind == 1 ? 0.5 * round(2.0 * at[k]) : at[k];
+            }
+            const uint32_t wanted =
+                nearest_of_all((const double(*)[3])points, POINTS, at, &distance);
+            const bool within = distance < reach;
+            assert_int_equal(ov_grid_nearest(&grid, points[0], sizeof *points, at),
+                             within ? wanted : OV_NOBODY);
+            none += !within;
+        }
+        assert_in_range(none, 10, 290);
+        ov_grid_destroy(&grid);
+    }
+    free(points);
+}
+
 static const ov_reduction_options usual_options = {.cost = OV_MERGE_L2, .reach = 5.0};
 
 static void what_is_no_gaussian_is_refused(void **state) {
@@ -679,6 +729,7 @@ int main(void) {
         cmocka_unit_test(extreme_amplitudes_stay_finite),
         cmocka_unit_test(a_crowd_at_one_point_takes_no_quadratic_time),
         cmocka_unit_test(a_search_asks_so_many_and_no_more),
+        cmocka_unit_test(the_nearest_is_found),
         cmocka_unit_test(what_is_no_gaussian_is_refused),
     };
     return cmocka_run_group_tests(tests, open_context, close_context);

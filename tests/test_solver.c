@@ -2,8 +2,8 @@
  * The solver of the adaptive fit: the maps between parameters and polynomials, the blocks of the
  * preconditioner, and whole solutions against a dense system in double.
  */
-#include "fit/adaptive/solver.h"
 #include "model/ellipsoid.h"
+#include "selftest/problem.h"
 #include "selftest/twin_factor.h"
 #include "support.h"
 
@@ -249,9 +249,7 @@ static void blocks_equal_twin(void **state) {
 /* A model about points, with weights and residuals; a few of them without weight. */
 typedef struct problem {
     bench b;
-    double *x;
-    float *weight, *u;
-    ov_buffer weights, residuals, moments, gram;
+    ov_problem own;
 } problem;
 
 static void create_problem(problem *p, ovoid_context *context, size_t count, size_t points,
@@ -259,57 +257,45 @@ static void create_problem(problem *p, ovoid_context *context, size_t count, siz
     test_random random = {seed};
     ov_quadric *const quadrics = test_alloc(count, sizeof *quadrics);
     const double half = 1.2 * cbrt((double)count);
-    *p = (problem){.x = test_alloc(count * P, sizeof *p->x)};
+    double *const x = test_alloc(count * P, sizeof *x);
     for (size_t i = 0; i < count; ++i) {
-        random_factor(&random, half, p->x + i * P);
+        random_factor(&random, half, x + i * P);
         for (size_t k = 0; k < P; ++k)
-            p->x[i * P + k] = (float)p->x[i * P + k];
+            x[i * P + k] = (float)x[i * P + k];
         if (i < lost)
-            p->x[i * P + OV_FACTOR_CENTRE] += 1000.0;
-        ov_factor_quadric(p->x + i * P, &quadrics[i]);
+            x[i * P + OV_FACTOR_CENTRE] += 1000.0;
+        ov_factor_quadric(x + i * P, &quadrics[i]);
     }
     float *const xyz = random_points(&random, points, half + 2.0);
     bench_create(&p->b, context, quadrics, count, xyz, points, 1e-30);
     const size_t all = p->b.points.packs * OV_PACK;
-    p->weight = test_alloc(all, sizeof *p->weight);
-    p->u = test_alloc(all, sizeof *p->u);
+    float *const weight = test_alloc(all, sizeof *weight), *const u = test_alloc(all, sizeof *u);
     for (size_t k = 0; k < points; ++k) {
-        p->weight[k] = k % 7 ? (float)random_uniform(&random, 0.2, 2.0) : 0.0f;
-        p->u[k] = p->weight[k] * (float)random_uniform(&random, -0.5, 0.5);
+        weight[k] = k % 7 ? (float)random_uniform(&random, 0.2, 2.0) : 0.0f;
+        u[k] = weight[k] * (float)random_uniform(&random, -0.5, 0.5);
     }
-    write_floats(context, &p->weights, p->weight, all);
-    write_floats(context, &p->residuals, p->u, all);
+    p->own = (ov_problem){.points = &p->b.points,
+                          .terms = &p->b.terms,
+                          .lists = &p->b.lists,
+                          .operations = &p->b.operations,
+                          .x = x,
+                          .weight = weight,
+                          .u = u};
+    test_check(context, ov_problem_upload(context, &p->own));
     free(xyz);
     free(quadrics);
 }
 
 static void destroy_problem(problem *p) {
+    ov_problem_destroy(&p->own);
     bench_destroy(&p->b);
-    ov_buffer *const buffers[] = {&p->weights, &p->residuals, &p->moments, &p->gram};
-    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
-        ov_buffer_destroy(buffers[k]);
-    free(p->x);
-    free(p->weight);
-    free(p->u);
 }
 
 static double *solve(problem *p, ov_solver *solver, double lambda, uint32_t iterations,
                      double tolerance) {
-    bench *const b = &p->b;
-    test_check(b->context, ov_moments(b->context, &b->operations, &b->points, &b->terms, &b->lists,
-                                      &p->residuals, &p->moments));
-    test_check(b->context, ov_gram(b->context, &b->operations, &b->points, &b->terms, &b->lists,
-                                   &p->weights, &p->gram));
-    const ov_system system = {.points = &b->points,
-                              .terms = &b->terms,
-                              .lists = &b->lists,
-                              .weight = &p->weights,
-                              .moments = &p->moments,
-                              .gram = &p->gram,
-                              .parameters = p->x};
-    double *const step = test_alloc(b->terms_count * P, sizeof *step);
-    test_check(b->context, ov_solve(b->context, solver, &b->operations, &system, lambda, iterations,
-                                    tolerance, step));
+    double *const step = test_alloc(p->b.terms_count * P, sizeof *step);
+    test_check(p->b.context, ov_problem_solve(p->b.context, &p->own, solver, lambda, iterations,
+                                              tolerance, step));
     return step;
 }
 
@@ -320,8 +306,8 @@ static double error_of(const problem *p, const double *step, double lambda) {
     double *const factored = test_alloc(size * size, sizeof *factored);
     double *const wanted = test_alloc(size, sizeof *wanted);
     double error = 0.0, whole = 0.0;
-    assert_true(
-        ov_twin_system(p->x, count, p->b.xyz, p->weight, p->u, p->b.count, lambda, matrix, wanted));
+    assert_true(ov_twin_system(p->own.x, count, p->b.xyz, p->own.weight, p->own.u, p->b.count,
+                               lambda, matrix, wanted));
     memcpy(factored, matrix, size * size * sizeof *matrix);
     assert_true(ov_twin_solve(factored, size, wanted));
     for (size_t i = 0; i < size; ++i)
@@ -474,8 +460,8 @@ static void no_residual_no_step(void **state) {
     problem p;
     ov_solver solver = {0};
     create_problem(&p, *state, 3, 100, 0, 6);
-    memset(p.u, 0, p.b.points.packs * OV_PACK * sizeof *p.u);
-    write_floats(*state, &p.residuals, p.u, p.b.points.packs * OV_PACK);
+    memset(p.own.u, 0, p.b.points.packs * OV_PACK * sizeof *p.own.u);
+    test_check(*state, ov_problem_upload(*state, &p.own));
     double *const step = solve(&p, &solver, 0.01, 10, 1e-3);
     for (size_t j = 0; j < 3 * P; ++j)
         assert_true(step[j] == 0.0);

@@ -168,6 +168,7 @@ typedef struct ov_lists {
     ov_kernel packs_of_terms, scan_lists, hand_out_entries, lists_of_packs;
     size_t room_chunks, room_entries, room_items; /* what there is room for: as asked for, so that
                                                      what is launched does not go with buffers */
+    bool built;
     ov_later later; /* the read of what they come to, between begin and end */
     cl_uint told[5];
 } ov_lists;
@@ -185,6 +186,9 @@ ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_po
 ovoid_status ov_lists_end(ovoid_context *context, ov_lists *lists, bool *whole);
 /* Whether lists were built in the memory before: ov_lists_begin() has something to begin with. */
 bool ov_lists_built(const ov_lists *lists);
+/* From here on as if they had never been built, so that what is launched does not go with what was
+ * built before. The memory stays. */
+void ov_lists_forget(ov_lists *lists);
 void ov_lists_destroy(ov_lists *lists);
 
 /* The packs that terms reach, ascending, from lists that were built with those of packs. list: room

@@ -53,6 +53,7 @@ static size_t roomy(const ovoid_context *context, size_t room, size_t wanted) {
 
 static ovoid_status reserve_chunks(ovoid_context *context, ov_lists *lists, size_t chunks) {
     ovoid_status status = OVOID_OK;
+    lists->room_chunks = 0; /* until all buffers are there */
     OV_TRY(ov_buffer_reserve(context, &lists->next, chunks * sizeof(cl_uint), "chunks of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->entry_group, chunks * OV_CHUNK * sizeof(cl_uint),
                              "chunks of lists"));
@@ -135,7 +136,7 @@ static ovoid_status reserve_starts(ovoid_context *context, ov_lists *lists, cons
     if (!lists->packs_only)
         OV_TRY(ov_buffer_reserve(context, &lists->term_start, (p->terms + (size_t)1) * size,
                                  "starts of lists"));
-    if (!lists->next.memory)
+    if (lists->room_chunks == 0)
         OV_TRY(reserve_chunks(context, lists, (size_t)p->terms * CHUNKS_PER_TERM));
 cleanup:
     return status;
@@ -161,26 +162,35 @@ cleanup:
     return status;
 }
 
-static ovoid_status reserve_items(ovoid_context *context, ov_lists *lists, const plan *p,
-                                  size_t entries) {
+static ovoid_status reserve_packs(ovoid_context *context, ov_lists *lists, const plan *p,
+                                  size_t entries, size_t items) {
     ovoid_status status = OVOID_OK;
-    const size_t size = sizeof(cl_uint), items = roomy(context, lists->room_items, lists->items);
-    entries = roomy(context, lists->room_entries, entries);
-    lists->room_items = lists->room_entries = 0; /* until all buffers are there */
-    if (!lists->packs_only)
-        OV_TRY(ov_buffer_reserve(context, &lists->term_item, items * size, "packs of ellipsoids"));
-    if (lists->terms_only) {
-        lists->room_items = items;
-        return OVOID_OK;
-    }
+    const size_t size = sizeof(cl_uint);
     OV_TRY(ov_buffer_reserve(context, &lists->group_term, entries * size, "groups of packs"));
     OV_TRY(ov_buffer_reserve(context, &lists->group_bits, entries * sizeof(cl_ushort),
                              "groups of packs"));
     OV_TRY(ov_buffer_reserve(context, &lists->pack_start, (p->packs + (size_t)1) * size,
                              "starts of lists"));
     OV_TRY(ov_buffer_reserve(context, &lists->pack_item, items * size, "ellipsoids of packs"));
+cleanup:
+    return status;
+}
+
+static ovoid_status reserve_items(ovoid_context *context, ov_lists *lists, const plan *p,
+                                  size_t entries) {
+    ovoid_status status = OVOID_OK;
+    const size_t items = roomy(context, lists->room_items, lists->items);
+    entries = roomy(context, lists->room_entries, entries);
+    lists->room_items = lists->room_entries = 0;
+    lists->built = false; /* until all buffers are there */
+    if (!lists->packs_only)
+        OV_TRY(ov_buffer_reserve(context, &lists->term_item, items * sizeof(cl_uint),
+                                 "packs of ellipsoids"));
+    if (!lists->terms_only)
+        OV_TRY(reserve_packs(context, lists, p, entries, items));
     lists->room_items = items;
     lists->room_entries = entries;
+    lists->built = true;
 cleanup:
     return status;
 }
@@ -228,8 +238,12 @@ cleanup:
 /* ---- without waiting ------------------------------------------------------------------------ */
 
 bool ov_lists_built(const ov_lists *lists) {
-    return lists->next.memory && (lists->terms_only || lists->pack_item.memory) &&
-           (lists->packs_only || lists->term_item.memory);
+    return lists->built;
+}
+
+void ov_lists_forget(ov_lists *lists) {
+    lists->built = false;
+    lists->room_chunks = lists->room_entries = lists->room_items = 0;
 }
 
 /* Entries and pairs that there is room for. */

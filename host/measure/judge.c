@@ -88,6 +88,10 @@ cleanup:
     return status;
 }
 
+void ov_judge_begin(ov_judge *judge) {
+    ov_marcher_begin(judge->marcher);
+}
+
 void ov_judge_destroy(ov_judge *judge) {
     ov_marcher_destroy(&judge->marcher);
     ov_meter_destroy(&judge->meter);
@@ -174,17 +178,6 @@ static void add_spots(const ov_judge *judge, const ovoid_mesh *mesh, const float
 /* What rounding may add to a distance in a grid, as a share. */
 #define ROUNDING 1e-4
 
-static ovoid_status grid_of_spots(ovoid_context *context, const ov_spot *spots, size_t count,
-                                  double apart, ov_grid *grid) {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t n = 0; n < count; ++n)
-        for (size_t k = 0; k < 3; ++k) {
-            low[k] = fmin(low[k], spots[n].at[k]);
-            high[k] = fmax(high[k], spots[n].at[k]);
-        }
-    return ov_grid_create(context, low, high, (1.0 + ROUNDING) * apart, count, count, grid);
-}
-
 /* Whether one of the spots in the grid is nearer than that. */
 static bool has_near(const ov_grid *grid, const ov_spot *spots, const double at[3], double apart) {
     uint32_t near[2 * OV_NEAR_MAX];
@@ -208,7 +201,8 @@ ovoid_status ov_spots_thin(ovoid_context *context, ov_spot *spots, size_t *count
         return OVOID_OK;
     qsort(spots, *count, sizeof *spots, by_distance);
     if (apart > 0.0)
-        OV_TRY(grid_of_spots(context, spots, *count, apart, &grid));
+        OV_TRY(ov_grid_about(context, spots->at, sizeof *spots, *count, (1.0 + ROUNDING) * apart,
+                             &grid));
     for (size_t n = 0; n < *count && kept < most; ++n) {
         if (apart > 0.0 && has_near(&grid, spots, spots[n].at, apart))
             continue;

@@ -57,6 +57,8 @@ typedef struct ov_judgement {
 
 ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t atoms, double decay,
                              double isovalue, double spacing, ov_watch watch, ov_judge *judge);
+/* To be called before a search: what the judge launches then does not go with the one before. */
+void ov_judge_begin(ov_judge *judge);
 void ov_judge_destroy(ov_judge *judge);
 
 /* Distances are those of the meshes' vertices, which lie on the surfaces. */

@@ -471,8 +471,9 @@ static ovoid_status make_vertices(ovoid_context *context, marcher *m, size_t pac
     bool begun = begin;
     OV_TRY(fill_vertices(context, m, packs));
     OV_TRY(box_packs(context, m, packs));
-    OV_TRY(begin_lists(context, m, &m->vertex_lists, &m->vertex_points, &begun));
-    status = refine(context, m, packs);
+    status = begin_lists(context, m, &m->vertex_lists, &m->vertex_points, &begun);
+    if (status == OVOID_OK)
+        status = refine(context, m, packs);
     *whole = true;
     if (begun && status == OVOID_OK)
         status = ov_lists_end(context, &m->vertex_lists, whole);
@@ -1084,6 +1085,13 @@ void ov_marcher_stay(ov_marcher *m) {
         m->wanted[axis] = m->grid.bricks[axis] * brick_points[axis] + WANTED_MORE;
         m->wanted[axis] = m->wanted[axis] < limit[axis] ? m->wanted[axis] : limit[axis];
     }
+}
+
+void ov_marcher_begin(ov_marcher *m) {
+    drop_grid(m);
+    ov_lists_forget(&m->lists);
+    ov_lists_forget(&m->vertex_lists);
+    m->placed_vertices = m->corners_triangles = 0;
 }
 
 void ov_marcher_destroy(ov_marcher **kept) {

@@ -43,6 +43,10 @@ void ov_marcher_destroy(ov_marcher **marcher);
  * then what depends on the size of pieces is not made anew each time. */
 void ov_marcher_stay(ov_marcher *marcher);
 
+/* What is launched for the next meshes does not go with those before: of them, only memory and the
+ * size of pieces stays. */
+void ov_marcher_begin(ov_marcher *marcher);
+
 /* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The light one knows its
  * components only after ov_mesh_finish(), so that the device can have something to do meanwhile;
  * normals: whether it is to have them. */

@@ -233,16 +233,59 @@ static const double *strided(const double *points, size_t stride, size_t n) {
     return (const double *)((const char *)points + n * stride);
 }
 
-ovoid_status ov_grid_of(ovoid_context *context, const double *points, size_t stride, size_t count,
-                        double reach, ov_grid *grid) {
+ovoid_status ov_grid_about(ovoid_context *context, const double *points, size_t stride,
+                           size_t count, double reach, ov_grid *grid) {
     double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t n = 0; n < count; ++n)
         for (int k = 0; k < 3; ++k) {
             low[k] = fmin(low[k], strided(points, stride, n)[k]);
             high[k] = fmax(high[k], strided(points, stride, n)[k]);
         }
-    ovoid_status status = ov_grid_create(context, low, high, reach, count, count, grid);
+    return ov_grid_create(context, low, high, reach, count, count, grid);
+}
+
+ovoid_status ov_grid_of(ovoid_context *context, const double *points, size_t stride, size_t count,
+                        double reach, ov_grid *grid) {
+    ovoid_status status = ov_grid_about(context, points, stride, count, reach, grid);
     for (size_t n = 0; n < count && status == OVOID_OK; ++n)
         status = ov_grid_add(context, grid, strided(points, stride, n), (uint32_t)n);
     return status;
+}
+
+/* The nearest so far. */
+typedef struct nearest {
+    uint32_t index;
+    double square;
+} nearest;
+
+static void nearest_in_cell(const ov_grid *grid, const ov_cell_members *cell, const double *points,
+                            size_t stride, const double at[3], nearest *best) {
+    for (size_t n = 0; n < cell->count; ++n) {
+        const uint32_t index = grid->pool[cell->first + n].index;
+        const double *const point = strided(points, stride, index);
+        double square = 0.0;
+        for (int k = 0; k < 3; ++k)
+            square += (point[k] - at[k]) * (point[k] - at[k]);
+        if (square < best->square || (square == best->square && index < best->index))
+            *best = (nearest){index, square};
+    }
+}
+
+/* What rounding may do to the cell of a point, as a share of the reach. */
+#define CELL_ROUNDING 1e-6
+
+uint32_t ov_grid_nearest(const ov_grid *grid, const double *points, size_t stride,
+                         const double at[3]) {
+    nearest best = {OV_NOBODY, INFINITY};
+    const double sure = (1.0 - CELL_ROUNDING) * grid->reach;
+    int32_t home[3];
+    ov_cells_place(&grid->cells, at, home);
+    for (int n = 0; n < 27; ++n) {
+        const int32_t place[3] = {home[0] + n % 3 - 1, home[1] + n / 3 % 3 - 1,
+                                  home[2] + n / 9 - 1};
+        const uint32_t number = ov_cells_find(&grid->cells, place);
+        if (number != OV_NO_CELL)
+            nearest_in_cell(grid, grid->members + number, points, stride, at, &best);
+    }
+    return best.square <= sure * sure ? best.index : OV_NOBODY;
 }

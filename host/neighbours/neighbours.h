@@ -66,7 +66,12 @@ ovoid_status ov_grid_create(ovoid_context *context, const double low[3], const d
                             double reach, size_t expected, size_t indices, ov_grid *grid);
 void ov_grid_destroy(ov_grid *grid);
 
-/* A grid of `count` >= 1 points, x, y, z each and `stride` bytes apart, with their numbers. */
+/* An empty grid in the box of `count` >= 1 points, x, y, z each and `stride` bytes apart, for what
+ * is added of them. */
+ovoid_status ov_grid_about(ovoid_context *context, const double *points, size_t stride,
+                           size_t count, double reach, ov_grid *grid);
+
+/* The same with all the points in it, by their numbers. */
 ovoid_status ov_grid_of(ovoid_context *context, const double *points, size_t stride, size_t count,
                         double reach, ov_grid *grid);
 
@@ -80,5 +85,13 @@ void ov_grid_remove(ov_grid *grid, const double centre[3], uint32_t index);
  * order, OV_NEAR_MAX of them at most; returns their number. */
 size_t ov_grid_near(const ov_grid *grid, const double centre[3], uint32_t below,
                     uint32_t found[2 * OV_NEAR_MAX]);
+
+#define OV_NOBODY UINT32_MAX
+
+/* The one nearest to the place of the points in the grid, which lie where they were added; of
+ * several as near, the one with the lowest index. OV_NOBODY where none is surely within reach. All
+ * in the cells about the place are asked, however many. */
+uint32_t ov_grid_nearest(const ov_grid *grid, const double *points, size_t stride,
+                         const double at[3]);
 
 #endif

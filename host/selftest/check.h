@@ -105,6 +105,11 @@ void ov_setting_destroy(ov_setting *setting);
 float *ov_setting_floats(ovoid_context *context, const ov_setting *setting, ov_random *random,
                          double low, double high);
 
+/* Whether an ascending list, one of many that follow one another from start[list] on, has the
+ * value.
+ */
+bool ov_list_holds(const uint32_t *start, const uint32_t *item, size_t list, uint32_t value);
+
 /* ---- the checks --------------------------------------------------------------------------- */
 
 /* Sizes and offsets of the structures that host and kernels share, in the order of

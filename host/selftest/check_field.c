@@ -123,7 +123,7 @@ static bool is_list(ov_checking *c, const uint32_t *start, const uint32_t *item,
     return true;
 }
 
-static bool holds(const uint32_t *start, const uint32_t *item, size_t list, uint32_t value) {
+bool ov_list_holds(const uint32_t *start, const uint32_t *item, size_t list, uint32_t value) {
     uint32_t low = start[list], high = start[list + 1];
     while (low < high) {
         const uint32_t middle = low + (high - low) / 2;
@@ -152,9 +152,9 @@ static void expect_pairs(ov_checking *c, const ov_setting *s, const pairs *p, do
                          size_t stride) {
     for (size_t i = 0; i < s->count; ++i)
         for (uint32_t k = p->term_start[i]; k < p->term_start[i + 1]; ++k)
-            if (!ov_expect(c, holds(p->pack_start, p->pack_item, p->term_item[k], (uint32_t)i),
-                           "term %zu has pack %u, which does not have it", i,
-                           (unsigned)p->term_item[k]))
+            if (!ov_expect(
+                    c, ov_list_holds(p->pack_start, p->pack_item, p->term_item[k], (uint32_t)i),
+                    "term %zu has pack %u, which does not have it", i, (unsigned)p->term_item[k]))
                 return;
     for (size_t i = 0; i < s->count; i += stride) {
         const double reach = log(s->quadrics[i].amplitude / cutoff);
@@ -162,7 +162,7 @@ static void expect_pairs(ov_checking *c, const ov_setting *s, const pairs *p, do
             double box[6];
             box_of_pack(s, pack, box);
             const double least = ov_twin_least_exponent(&s->quadrics[i], box);
-            const bool listed = holds(p->term_start, p->term_item, i, (uint32_t)pack);
+            const bool listed = ov_list_holds(p->term_start, p->term_item, i, (uint32_t)pack);
             ov_expect(c, listed || least > reach - 1e-3,
                       "term %zu reaches pack %zu (%.4g of %.4g) and is not in its list", i, pack,
                       least, reach);

@@ -1,8 +1,8 @@
 /* The kernels of the adaptive method, and a fit. */
 #include "selftest/check.h"
 
-#include "fit/adaptive/solver.h"
-#include "mixture/component.h"
+#include "selftest/losses.h"
+#include "selftest/problem.h"
 #include "selftest/twin_factor.h"
 
 #include <math.h>
@@ -13,109 +13,16 @@ enum { P = OV_FACTOR_PARAMETERS };
 
 /* ---- merges ------------------------------------------------------------------------------- */
 
-/* Values, bounds on them and weights at the points. */
-typedef struct charges {
-    float *value, *low, *high, *weight;
-} charges;
-
-static ovoid_status make_charges(ovoid_context *context, const ov_setting *s, charges *a) {
-    ov_random random = {11};
-    a->value = ov_setting_floats(context, s, &random, 0.0, 0.0);
-    a->low = ov_setting_floats(context, s, &random, 0.7, 1.3);
-    a->high = ov_setting_floats(context, s, &random, 0.0, 0.0);
-    a->weight = ov_setting_floats(context, s, &random, 0.0, 2.0);
-    if (!a->value || !a->low || !a->high || !a->weight)
-        return OVOID_ERROR_MEMORY;
-    for (size_t k = 0; k < s->places; ++k) {
-        const double phi = ov_twin_field(s->quadrics, s->count, s->xyz + 3 * k).value;
-        a->value[k] = (float)phi;
-        a->low[k] *= (float)phi;
-        a->high[k] = k % 3 == 0 ? FLT_MAX : a->low[k];
-        a->low[k] = k % 3 == 1 ? -FLT_MAX : a->low[k];
-    }
-    return OVOID_OK;
-}
-
-static void destroy_charges(charges *a) {
-    free(a->value);
-    free(a->low);
-    free(a->high);
-    free(a->weight);
-}
-
-static double square_residual(double value, double low, double high) {
-    const double r = value - fmin(fmax(value, low), high);
-    return r * r;
-}
-
-/* Over all points: the lists leave none out. */
-static ov_twin_sum twin_loss(const ov_setting *s, const charges *a, const uint32_t pair[2],
-                             const ov_quadric *merged) {
-    ov_twin_sum sum = {0};
-    for (size_t k = 0; k < s->places; ++k) {
-        const double *const y = s->xyz + 3 * k;
-        const ov_twin_sum ei = ov_twin_field(&s->quadrics[pair[0]], 1, y),
-                          ej = ov_twin_field(&s->quadrics[pair[1]], 1, y),
-                          em = ov_twin_field(merged, 1, y);
-        const double before = a->value[k], after = before - ei.value - ej.value + em.value;
-        const double x = square_residual(after, a->low[k], a->high[k]),
-                     z = square_residual(before, a->low[k], a->high[k]);
-        sum.value += a->weight[k] * (x - z);
-        sum.scale +=
-            a->weight[k] *
-            (x + z + 2.0 * sqrt(x) * (ei.scale + ej.scale + em.scale + 2.0 * fabs(before)));
-    }
-    return sum;
-}
-
 /* Each term with the next. */
 static ovoid_status make_pairs(ovoid_context *context, const ov_setting *s, uint32_t *pairs,
                                ov_quadric *merged) {
+    ovoid_status status = OVOID_OK;
     for (uint32_t i = 0; i + 1 < s->count; ++i) {
-        ov_component p, q, both;
         pairs[2 * i] = i;
         pairs[2 * i + 1] = i + 1;
-        if (!ov_component_of_quadric(&s->quadrics[i], &p) ||
-            !ov_component_of_quadric(&s->quadrics[i + 1], &q))
-            return ov_fail(context, OVOID_ERROR_NUMERIC, "a term of a check is no Gaussian");
-        ov_component_merge(&p, &q, &both);
-        ov_quadric_of_component(&both, &merged[i]);
+        OV_TRY(ov_merge_quadrics(context, &s->quadrics[i], &s->quadrics[i + 1], &merged[i]));
     }
-    return OVOID_OK;
-}
-
-static ovoid_status run_losses(ovoid_context *context, const ov_setting *s, const charges *a,
-                               const uint32_t *pairs, const ov_quadric *merged, size_t count,
-                               float **losses) {
-    ovoid_status status = OVOID_OK;
-    const double origin[3] = {0};
-    const float *const given[] = {a->value, a->low, a->high, a->weight};
-    const cl_uint pairs_count = (cl_uint)count;
-    ov_kernel kernel = {0};
-    ov_terms terms = {0};
-    ov_buffer in[4] = {0}, list = {0}, loss = {0};
-    ov_device *device;
-    OV_TRY(ov_device_get(context, &device));
-    OV_TRY(ov_kernel_create(context, "merge", "merge_loss", &kernel));
-    OV_TRY(ov_terms_set(context, &terms, merged, count, origin, 1e-37));
-    for (size_t k = 0; k < 4; ++k)
-        OV_TRY(ov_put_floats(context, &in[k], given[k], s->places));
-    OV_TRY(ov_buffer_put(context, &list, pairs, 2 * count * sizeof *pairs, "pairs"));
-    OV_TRY(ov_buffer_reserve(context, &loss, count * sizeof(float), "losses"));
-    OV_TRY(OV_LAUNCH(
-        context, &kernel, count * device->shape.lanes, device->team, OV_ARG(pairs_count),
-        OV_ARG(list.memory), OV_ARG(terms.device.memory), OV_ARG(s->points.xyz.memory),
-        OV_ARG(s->points.pack_origins.memory), OV_ARG(in[0].memory), OV_ARG(in[1].memory),
-        OV_ARG(in[2].memory), OV_ARG(in[3].memory), OV_ARG(s->lists.term_start.memory),
-        OV_ARG(s->lists.term_item.memory), OV_ARG(s->terms.device.memory), OV_ARG(loss.memory)));
-    OV_TRY(ov_read_words(context, &loss, count, losses));
 cleanup:
-    for (size_t k = 0; k < 4; ++k)
-        ov_buffer_destroy(&in[k]);
-    ov_buffer_destroy(&list);
-    ov_buffer_destroy(&loss);
-    ov_terms_destroy(&terms);
-    ov_kernel_destroy(&kernel);
     return status;
 }
 
@@ -123,13 +30,13 @@ ovoid_status ov_check_merge(ov_checking *c) {
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = c->context;
     ov_setting s = {0};
-    charges a = {0};
+    ov_charges a = {0};
     uint32_t *pairs = NULL;
     ov_quadric *merged = NULL;
     float *losses = NULL;
     OV_TRY(ov_setting_create(context, 10, ov_check_size(c, 70, 20), ov_check_size(c, 1303, 203),
                              3.0, 5.0, 1e-37, &s));
-    OV_TRY(make_charges(context, &s, &a));
+    OV_TRY(ov_charges_create(context, s.quadrics, s.count, &s.points, s.xyz, 11, &a));
     pairs = ov_alloc(context, 2 * s.count, sizeof *pairs, "pairs of a check");
     merged = ov_alloc(context, s.count, sizeof *merged, "terms of a check");
     if (!pairs || !merged) {
@@ -137,15 +44,18 @@ ovoid_status ov_check_merge(ov_checking *c) {
         goto cleanup;
     }
     OV_TRY(make_pairs(context, &s, pairs, merged));
-    OV_TRY(run_losses(context, &s, &a, pairs, merged, s.count - 1, &losses));
+    OV_TRY(
+        ov_losses(context, &s.points, &s.terms, &s.lists, &a, pairs, merged, s.count - 1, &losses));
     for (size_t n = 0; n + 1 < s.count; ++n)
-        ov_expect_close(c, losses[n], twin_loss(&s, &a, pairs + 2 * n, &merged[n]), 4.0,
-                        "merge_loss: pair", n);
+        ov_expect_close(
+            c, losses[n],
+            ov_twin_loss(s.quadrics, pairs + 2 * n, &merged[n], s.xyz, s.places, &a, NULL), 4.0,
+            "merge_loss: pair", n);
 cleanup:
     free(pairs);
     free(merged);
     free(losses);
-    destroy_charges(&a);
+    ov_charges_destroy(&a);
     ov_setting_destroy(&s);
     return status;
 }
@@ -158,20 +68,13 @@ cleanup:
 
 typedef struct problem {
     ov_setting s;
-    size_t size; /* parameters of all */
-    double *x;   /* they */
-    float *weight, *u;
+    ov_problem own;
+    size_t size;            /* parameters of all */
     double *matrix, *right; /* J^T W J + lambda D, -J^T W r */
-    ov_buffer weights, residuals, moments, gram;
 } problem;
 
 static void destroy_problem(problem *p) {
-    ov_buffer *const buffers[] = {&p->weights, &p->residuals, &p->moments, &p->gram};
-    for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
-        ov_buffer_destroy(buffers[k]);
-    free(p->x);
-    free(p->weight);
-    free(p->u);
+    ov_problem_destroy(&p->own);
     free(p->matrix);
     free(p->right);
     ov_setting_destroy(&p->s);
@@ -185,25 +88,24 @@ static ovoid_status make_problem(ov_checking *c, problem *p) {
     OV_TRY(ov_setting_create(context, 12, ov_check_size(c, 40, 5), ov_check_size(c, 3001, 301), 3.0,
                              5.0, 1e-30, s));
     p->size = s->count * P;
-    p->x = ov_alloc(context, p->size, sizeof *p->x, "parameters of a check");
-    p->weight = ov_setting_floats(context, s, &random, 0.2, 2.0);
-    p->u = ov_setting_floats(context, s, &random, -0.5, 0.5);
+    p->own = (ov_problem){.points = &s->points,
+                          .terms = &s->terms,
+                          .lists = &s->lists,
+                          .operations = &s->operations,
+                          .x = ov_alloc(context, p->size, sizeof(double), "parameters of a check"),
+                          .weight = ov_setting_floats(context, s, &random, 0.2, 2.0),
+                          .u = ov_setting_floats(context, s, &random, -0.5, 0.5)};
     p->matrix = ov_alloc(context, p->size * p->size, sizeof *p->matrix, "a check's matrix");
     p->right = ov_alloc(context, p->size, sizeof *p->right, "a check's right side");
     status = OVOID_ERROR_MEMORY;
-    if (!p->x || !p->weight || !p->u || !p->matrix || !p->right)
+    if (!p->own.x || !p->own.weight || !p->own.u || !p->matrix || !p->right)
         goto cleanup;
     for (size_t i = 0; i < s->count; ++i)
-        ov_factor_of_quadric(&s->quadrics[i], p->x + i * P);
-    if (!ov_twin_system(p->x, s->count, s->xyz, p->weight, p->u, s->places, LAMBDA, p->matrix,
-                        p->right))
+        ov_factor_of_quadric(&s->quadrics[i], p->own.x + i * P);
+    if (!ov_twin_system(p->own.x, s->count, s->xyz, p->own.weight, p->own.u, s->places, LAMBDA,
+                        p->matrix, p->right))
         goto cleanup;
-    OV_TRY(ov_put_floats(context, &p->weights, p->weight, s->places));
-    OV_TRY(ov_put_floats(context, &p->residuals, p->u, s->places));
-    OV_TRY(ov_moments(context, &s->operations, &s->points, &s->terms, &s->lists, &p->residuals,
-                      &p->moments));
-    OV_TRY(
-        ov_gram(context, &s->operations, &s->points, &s->terms, &s->lists, &p->weights, &p->gram));
+    OV_TRY(ov_problem_upload(context, &p->own));
 cleanup:
     return status;
 }
@@ -269,17 +171,9 @@ static void expect_step(ov_checking *c, const problem *p, const double *wanted, 
 
 static ovoid_status solve(ov_checking *c, problem *p, bool apart, const double *wanted,
                           double *got) {
-    ov_setting *const s = &p->s;
     ov_solver solver = {.apart = apart};
-    const ov_system system = {.points = &s->points,
-                              .terms = &s->terms,
-                              .lists = &s->lists,
-                              .weight = &p->weights,
-                              .moments = &p->moments,
-                              .gram = &p->gram,
-                              .parameters = p->x};
     const ovoid_status status =
-        ov_solve(c->context, &solver, &s->operations, &system, LAMBDA, ITERATIONS, 1e-12, got);
+        ov_problem_solve(c->context, &p->own, &solver, LAMBDA, ITERATIONS, 1e-12, got);
     if (status == OVOID_OK)
         expect_step(c, p, wanted, got,
                     apart ? "solve_start, _product, _update, _direction: component"

@@ -4,12 +4,58 @@
 #   layers.sh [FOLDER]            fails on an include that leads upward, sideways, or to no room
 #   layers.sh --picture [FOLDER]  prints the rooms from the top, with their lines and what they use
 #
-# FOLDER is host/ by default. CONTRIBUTING.md (Rooms) has the picture.
+# FOLDER is host/ by default, and then CONTRIBUTING.md (Rooms) is held to the picture, too.
 set -eu
+self=$(cd "$(dirname "$0")" && pwd)/$(basename "$0")
 picture=
 if [ "${1:-}" = --picture ]; then
     picture=1
     shift
+fi
+if [ -z "$picture" ] && [ $# = 0 ]; then
+    # Who uses whom, base aside, in the picture and in the table's last column.
+    sh "$self" --picture | awk '
+        function name_of(room) {
+            sub(/\/.*/, "", room) # fit/adaptive and fit/l1 are in the row of fit
+            return room
+        }
+        FNR == NR {
+            room = name_of($1)
+            rooms[room]
+            sub(/^.* lines  /, "")
+            n = split($0, used, ", ")
+            for (i = 1; i <= n; i++) {
+                sub(/ .*/, "", used[i])
+                other = name_of(used[i])
+                if (other != room && other != "base" && other != "-")
+                    uses[room, other]
+            }
+            next
+        }
+        /^\| room, from the top/ { table = 1 }
+        !/^\|/ { table = 0 }
+        table && split($0, cell, "|") && match(cell[2], /`[a-z]+`/) {
+            room = substr(cell[2], RSTART + 1, RLENGTH - 2)
+            said[room]
+            while (match(cell[4], /`[a-z]+`/)) {
+                says[room, substr(cell[4], RSTART + 1, RLENGTH - 2)]
+                cell[4] = substr(cell[4], RSTART + RLENGTH)
+            }
+        }
+        function fault(what) {
+            print "CONTRIBUTING.md (Rooms): " what
+            faults++
+        }
+        END {
+            for (room in rooms) {
+                if (!(room in said))
+                    fault("there is no row for " room)
+                for (other in rooms)
+                    if (((room, other) in uses) != ((room, other) in says))
+                        fault(room (((room, other) in uses) ? " uses " : " does not use ") other)
+            }
+            exit faults > 0
+        }' - "$(dirname "$self")/../../CONTRIBUTING.md"
 fi
 cd "${1:-$(dirname "$0")/../../host}"
 find . -name '*.c' -o -name '*.h' -o -name '*.cpp' | LC_ALL=C sort | xargs awk -v picture="$picture" '

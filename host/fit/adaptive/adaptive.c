@@ -381,7 +381,7 @@ ovoid_status ov_adaptive_check(ovoid_context *context, const ovoid_adaptive_opti
 }
 
 /* Nothing of the search before stays, so that a second goal comes to the bits that it comes to
- * alone. */
+ * alone, */
 static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const ov_found *start) {
     f->options = options;
     f->start = start;
@@ -392,9 +392,13 @@ static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const
     f->expected = 0.0;
     f->width_max = ov_tuned.refine_width * sqrt(0.5 / options->decay);
     f->solver_before = ov_adaptive_solver_iterations(f);
-    ov_refiner_forget(&f->refiner);
-    f->refiner.solver.last = 0; /* so that the same is launched, too */
-    f->local.refiner.solver.last = 0;
+}
+
+/* and by the same launches, whether the search before came to its end or was stopped. */
+static void begin_launches(ov_adaptive *f) {
+    ov_judge_begin(&f->judge);
+    ov_refiner_begin(&f->refiner);
+    ov_local_begin(&f->local);
 }
 
 ovoid_status ov_adaptive_reach(ov_adaptive *f, const ovoid_fit_options *options,
@@ -409,6 +413,7 @@ ovoid_status ov_adaptive_reach(ov_adaptive *f, const ovoid_fit_options *options,
     ov_device_counted(device, NULL, before);
     begin_search(f, options, start);
     OV_TRY(prepare(f));
+    begin_launches(f);
     OV_TRY(ov_trial_create(f, &best));
     result->sample_seconds = ov_seconds() - began;
     OV_TRY(reach_goal(f, &best));

@@ -41,9 +41,10 @@ static ovoid_status find_packs(ov_local *l, const ov_points *points) {
     bool begun, whole = true;
     l->reached.packs_only = true;
     begun = ov_lists_built(&l->reached);
-    OV_TRY(begun ? ov_lists_begin(context, &l->reached, points, &l->moving, 0.0)
-                 : ov_lists_build(context, &l->reached, points, &l->moving, 0.0));
-    status = ov_packs_reached(context, &l->reached, &l->list, &l->packs);
+    status = begun ? ov_lists_begin(context, &l->reached, points, &l->moving, 0.0)
+                   : ov_lists_build(context, &l->reached, points, &l->moving, 0.0);
+    if (status == OVOID_OK)
+        status = ov_packs_reached(context, &l->reached, &l->list, &l->packs);
     if (begun && status == OVOID_OK)
         status = ov_lists_end(context, &l->reached, &whole);
     else if (begun)
@@ -199,6 +200,12 @@ cleanup:
     free(all);
     free(m.x);
     return status;
+}
+
+void ov_local_begin(ov_local *l) {
+    ov_refiner_begin(&l->refiner);
+    ov_lists_forget(&l->reached);
+    ov_lists_forget(&l->lists);
 }
 
 void ov_local_destroy(ov_local *l) {

@@ -25,6 +25,8 @@ typedef struct ov_local {
 ovoid_status ov_refine_some(ov_local *local, const ov_target *target,
                             const ov_refine_options *options, double *x, size_t count,
                             const bool *chosen, double *misfit);
+/* To be called before a search, as ov_refiner_begin(). */
+void ov_local_begin(ov_local *local);
 void ov_local_destroy(ov_local *local);
 
 #endif

@@ -188,17 +188,9 @@ static ovoid_status merges_create(ovoid_context *context, const ov_component *co
     if (!m->partner)
         return OVOID_ERROR_MEMORY;
     memset(m->partner, 0xff, count * sizeof *m->partner);
-    if (apart > 0.0) {
-        double low[3], high[3];
-        for (int k = 0; k < 3; ++k)
-            low[k] = high[k] = components[0].mean[k];
-        for (size_t i = 0; i < count; ++i)
-            for (int k = 0; k < 3; ++k) {
-                low[k] = fmin(low[k], components[i].mean[k]);
-                high[k] = fmax(high[k], components[i].mean[k]);
-            }
-        OV_TRY(ov_grid_create(context, low, high, apart, count, count, &m->grid));
-    }
+    if (apart > 0.0)
+        OV_TRY(
+            ov_grid_about(context, components->mean, sizeof *components, count, apart, &m->grid));
 cleanup:
     return status;
 }

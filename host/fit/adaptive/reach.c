@@ -28,20 +28,6 @@ cleanup:
     return status;
 }
 
-/* An empty grid about all centres. */
-static ovoid_status make_grid(ovoid_context *context, const double *x, double reach, ov_reach *r) {
-    double low[3], high[3];
-    memcpy(low, x + OV_FACTOR_CENTRE, sizeof low);
-    memcpy(high, low, sizeof high);
-    for (size_t i = 0; i < r->count; ++i)
-        for (int k = 0; k < 3; ++k) {
-            const double at = x[i * OV_FACTOR_PARAMETERS + OV_FACTOR_CENTRE + (size_t)k];
-            low[k] = fmin(low[k], at);
-            high[k] = fmax(high[k], at);
-        }
-    return ov_grid_create(context, low, high, reach, r->count, r->count, &r->grid);
-}
-
 ovoid_status ov_reach_create(ovoid_context *context, const double *x, size_t count,
                              double log_least, ov_reach *reach) {
     ovoid_status status = OVOID_OK;
@@ -60,7 +46,8 @@ ovoid_status ov_reach_create(ovoid_context *context, const double *x, size_t cou
         sum += radius[i];
     }
     if (count > 0) {
-        OV_TRY(make_grid(context, x, fmax(WIDE * sum / (double)count, 1e-3), reach));
+        OV_TRY(ov_grid_about(context, x + OV_FACTOR_CENTRE, OV_FACTOR_PARAMETERS * sizeof *x, count,
+                             fmax(WIDE * sum / (double)count, 1e-3), &reach->grid));
         OV_TRY(sort_out(context, x, radius, reach));
     }
 cleanup:

@@ -257,6 +257,13 @@ void ov_refiner_forget(ov_refiner *r) {
     r->now.listed_count = r->tried.listed_count = 0;
 }
 
+void ov_refiner_begin(ov_refiner *r) {
+    ov_refiner_forget(r);
+    ov_lists_forget(&r->now.lists);
+    ov_lists_forget(&r->tried.lists);
+    r->solver.last = 0;
+}
+
 static void destroy_evaluation(ov_evaluation *e) {
     ov_terms_destroy(&e->terms);
     ov_lists_destroy(&e->lists);

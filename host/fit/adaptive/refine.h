@@ -59,6 +59,8 @@ ovoid_status ov_refine_evaluate(ov_refiner *refiner, const ov_target *target, co
                                 size_t count, double *misfit);
 /* To be called when points that it has seen are replaced by others in the same place. */
 void ov_refiner_forget(ov_refiner *refiner);
+/* To be called before a search: what it launches then does not go with the one before. */
+void ov_refiner_begin(ov_refiner *refiner);
 void ov_refiner_destroy(ov_refiner *refiner);
 
 #endif

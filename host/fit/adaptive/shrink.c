@@ -127,43 +127,68 @@ cleanup:
 
 /* ---- taking back ---------------------------------------------------------------------------- */
 
-/* Chooses the merged ellipsoid that is nearest to each spot, wherever that is. */
-static void choose_nearest(const shrinking *s, const ov_spots *spots) {
+/* Of some spots whose `found` is OV_NOBODY, the merged ellipsoids nearest to them, where these are
+ * within reach. Returns in *left for how many there is none. */
+static ovoid_status find_nearest(ov_adaptive *f, const shrinking *s, const ov_spots *spots,
+                                 double reach, uint32_t *found, size_t *left) {
+    ovoid_status status = OVOID_OK;
+    const double *const centres = centre_of(s->next.x, 0);
+    const size_t stride = OV_FACTOR_PARAMETERS * sizeof *centres;
+    ov_grid grid = {0};
+    OV_TRY(ov_grid_about(f->context, centres, stride, s->next.count, reach, &grid));
+    for (size_t i = 0; i < s->next.count; ++i)
+        if (is_merged(s, i))
+            OV_TRY(ov_grid_add(f->context, &grid, centre_of(s->next.x, i), (uint32_t)i));
+    *left = 0;
     for (size_t n = 0; n < spots->count; ++n) {
-        size_t best = s->next.count;
-        double least = INFINITY;
-        for (size_t i = 0; i < s->next.count; ++i) {
-            double square = 0.0;
-            if (!is_merged(s, i))
-                continue;
-            for (int k = 0; k < 3; ++k)
-                square += pow(centre_of(s->next.x, i)[k] - spots->spot[n].at[k], 2);
-            if (square < least) {
-                least = square;
-                best = i;
-            }
-        }
-        if (best < s->next.count)
-            s->chosen[best] = true;
+        if (found[n] == OV_NOBODY)
+            found[n] = ov_grid_nearest(&grid, centres, stride, spots->spot[n].at);
+        *left += found[n] == OV_NOBODY;
     }
+cleanup:
+    ov_grid_destroy(&grid);
+    return status;
+}
+
+/* Chooses the merged ellipsoid that is nearest to each spot, wherever that is. */
+static ovoid_status choose_nearest(ov_adaptive *f, shrinking *s, const ov_spots *spots) {
+    ovoid_status status = OVOID_OK;
+    size_t left = 0;
+    uint32_t *const found = ov_alloc(f->context, spots->count, sizeof *found, "merges");
+    if (!found)
+        return OVOID_ERROR_MEMORY;
+    memset(found, 0xff, spots->count * sizeof *found);
+    for (size_t i = 0; i < s->next.count; ++i)
+        left = is_merged(s, i) ? spots->count : left; /* else there is none for any */
+    for (double reach = ov_tuned.shrink_adapt; left > 0 && isfinite(reach); reach *= 4.0)
+        OV_TRY(find_nearest(f, s, spots, reach, found, &left));
+    for (size_t n = 0; n < spots->count; ++n)
+        if (found[n] != OV_NOBODY)
+            s->chosen[found[n]] = true;
+cleanup:
+    free(found);
+    return status;
+}
+
+/* Where two ellipsoids of the best model were merged. */
+static void merged_at(const ov_trial *best, const uint32_t from[2], double centre[3]) {
+    ov_component part[2];
+    for (size_t k = 0; k < 2; ++k) {
+        ov_quadric quadric;
+        ov_factor_quadric(best->x + from[k] * (size_t)OV_FACTOR_PARAMETERS, &quadric);
+        ov_component_of_quadric(&quadric, &part[k]); /* it was one when it was merged */
+    }
+    ov_component_mean(&part[0], &part[1], centre);
 }
 
 /* Takes note of where the merges chosen lay when they were made. */
 static ovoid_status remember(ov_adaptive *f, const ov_trial *best, shrinking *s) {
     ovoid_status status = OVOID_OK;
     for (size_t i = 0; i < s->next.count; ++i) {
-        ov_component part[2];
         double centre[3];
-        if (!s->chosen[i] || !is_merged(s, i))
+        if (!s->chosen[i])
             continue;
-        for (size_t k = 0; k < 2; ++k) {
-            ov_quadric quadric;
-            ov_factor_quadric(best->x + s->parents[2 * i + k] * (size_t)OV_FACTOR_PARAMETERS,
-                              &quadric);
-            if (!ov_component_of_quadric(&quadric, &part[k]))
-                return ov_fail(f->context, OVOID_ERROR_NUMERIC, "an ellipsoid is degenerate");
-        }
-        ov_component_mean(&part[0], &part[1], centre);
+        merged_at(best, s->parents + 2 * i, centre);
         OV_TRY(ov_places_add(f->context, &s->failed, centre));
     }
 cleanup:
@@ -177,14 +202,14 @@ static void append(const double *x, uint32_t parent, uint32_t other, size_t *cou
     ++*count;
 }
 
-/* Puts back what the chosen ellipsoids were in the best model. */
+/* Puts back what the chosen ellipsoids, merges all, were in the best model. */
 static void take_back(const ov_trial *best, shrinking *s) {
     size_t count = 0;
     for (size_t i = 0; i < s->next.count; ++i) {
         const uint32_t *const from = s->parents + 2 * i;
         if (!s->chosen[i])
             append(s->next.x + i * OV_FACTOR_PARAMETERS, from[0], from[1], &count, s);
-        for (size_t k = 0; s->chosen[i] && k < 2 && from[k] != UINT32_MAX; ++k)
+        for (size_t k = 0; s->chosen[i] && k < 2; ++k)
             append(best->x + from[k] * (size_t)OV_FACTOR_PARAMETERS, from[k], UINT32_MAX, &count,
                    s);
     }
@@ -199,7 +224,7 @@ static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spot
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_adaptive_emphasise(f, spots));
     memset(s->chosen, 0, s->next.count * sizeof *s->chosen);
-    choose_nearest(s, spots);
+    OV_TRY(choose_nearest(f, s, spots));
     OV_TRY(remember(f, best, s));
     take_back(best, s);
     OV_TRY(choose_near(f, spots, ov_tuned.shrink_back, s));

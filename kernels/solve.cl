@@ -376,7 +376,9 @@ static inline float sum_of_group(float own, __local float *scratch) {
 
 /* The three above in one, by one work-group: for up to OV_SOLVE_ALONE ellipsoids, for which a
  * launch takes longer than what it does. Each work-item has its own ellipsoids from beginning to
- * end. rz: the partial sums of `groups` groups; rz_next: one sum. */
+ * end. rz: the partial sums of `groups` groups; rz_next: one sum. scratch: a float per work-item,
+ * an argument since PoCL 3.1 makes one array for the whole process of an array in this kernel,
+ * where two threads that solve at once spoil it. */
 __kernel void solve_step(const uint count, const float lambda, const uint groups, const float share,
                          __global const uint *restrict state, __global const float *restrict factor,
                          __global const float *restrict moments,
@@ -386,8 +388,7 @@ __kernel void solve_step(const uint count, const float lambda, const uint groups
                          __global float *restrict x, __global float *restrict r,
                          __global float *restrict z, __global float *restrict polynomial,
                          __global float *restrict rz_next, __global float *restrict limit,
-                         __global uint *restrict state_next) {
-    __local float scratch[OV_SOLVE_WIDE];
+                         __global uint *restrict state_next, __local float *restrict scratch) {
     const uint at = get_local_id(0), size = get_local_size(0);
     const float before = take_sum(rz, groups);
     float sum = 0.0f;

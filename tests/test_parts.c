@@ -7,6 +7,7 @@
 #include "model/factor.h"
 #include "support.h"
 
+#include <pthread.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -245,6 +246,52 @@ static void holds_across_seams(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* Threads with a context each, at the same work on the same device, do not disturb each other. (An
+ * array of a kernel, which PoCL 3.1 keeps once for the process, did.) */
+typedef struct loner {
+    const ovoid_molecule *molecule;
+    const ovoid_fit_options *options;
+    ovoid_model *model[3];
+} loner;
+
+static void *fit_alone(void *user) {
+    loner *const l = user;
+    ovoid_context *context = NULL;
+    if (ovoid_context_create(&context) != OVOID_OK)
+        return NULL;
+    for (size_t n = 0; n < sizeof l->model / sizeof *l->model; ++n)
+        if (ovoid_fit(context, l->molecule, l->options, &l->model[n], NULL) != OVOID_OK)
+            print_message("%s\n", ovoid_context_error(context));
+    ovoid_context_destroy(&context);
+    return NULL;
+}
+
+static void threads_do_not_disturb_each_other(void **state) {
+    ovoid_molecule *molecule = ball(*state, 300);
+    ovoid_fit_options options = in_parts(0, 1);
+    ovoid_fit_result result;
+    pthread_t thread[2];
+    loner of[2];
+    test_skip_simulated(*state);
+    options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+    options.adaptive.ellipsoids = 37;
+    ovoid_model *alone = fit(*state, molecule, &options, &result);
+    for (int n = 0; n < 2; ++n) {
+        of[n] = (loner){.molecule = molecule, .options = &options};
+        assert_int_equal(pthread_create(&thread[n], NULL, fit_alone, &of[n]), 0);
+    }
+    for (int n = 0; n < 2; ++n)
+        pthread_join(thread[n], NULL);
+    for (int n = 0; n < 2; ++n)
+        for (int k = 0; k < 3; ++k) {
+            assert_non_null(of[n].model[k]);
+            expect_same(alone, of[n].model[k]);
+            ovoid_model_destroy(&of[n].model[k]);
+        }
+    ovoid_model_destroy(&alone);
+    ovoid_molecule_destroy(&molecule);
+}
+
 /* Numbers of ellipsoids are those asked for, shared out by atoms. */
 static void numbers_are_shared_out(void **state) {
     const size_t atoms = test_size(500, 150);
@@ -428,6 +475,7 @@ int main(void) {
         cmocka_unit_test(level_atoms_are_shared_out),
         cmocka_unit_test(cells_add_up),
         cmocka_unit_test(holds_across_seams),
+        cmocka_unit_test(threads_do_not_disturb_each_other),
         cmocka_unit_test(numbers_are_shared_out),
         cmocka_unit_test(a_stop_hands_over_what_held),
         cmocka_unit_test(goes_on_from_a_checkpoint),

@@ -1,13 +1,13 @@
 # Fits in parts: side by side to the same file, killed and resumed to the same file.
 need_device
-make_helix 1400 a.xyzr
+make_chain 1600 a.xyzr
 
-run "$OVOID" fit a.xyzr -o one.ovoid --part-atoms 64 --report r.json --no-measure
+run "$OVOID" fit a.xyzr -o one.ovoid --ratio 0.05 --part-atoms 64 --report r.json --no-measure
 expect_code 0
 expect_out "parts"
 parts=$(sed -n 's/.*"parts":[^0-9]*\([0-9]*\).*/\1/p' r.json)
-[ "$parts" -ge 22 ] || fail "1400 atoms in parts of 64 at most should be 22 or more, not $parts"
-run "$OVOID" fit a.xyzr -o two.ovoid --part-atoms 64 --jobs 2 --no-measure -q
+[ "$parts" -ge 25 ] || fail "1600 atoms in parts of 64 at most should be 25 or more, not $parts"
+run "$OVOID" fit a.xyzr -o two.ovoid --ratio 0.05 --part-atoms 64 --jobs 2 --no-measure -q
 expect_code 0
 cmp -s one.ovoid two.ovoid || fail "two jobs should make the model that one makes"
 
@@ -19,7 +19,7 @@ kills=0
 size=0
 last="ovoid fit with a checkpoint, killed and resumed"
 while [ $kills -lt 20 ]; do
-    "$OVOID" fit a.xyzr -o three.ovoid --part-atoms 64 --no-measure -q --checkpoint c --resume >"$out" 2>"$err" &
+    "$OVOID" fit a.xyzr -o three.ovoid --ratio 0.05 --part-atoms 64 --no-measure -q --checkpoint c --resume >"$out" 2>"$err" &
     pid=$!
     while [ "$(size_of c)" -le "$size" ] && kill -0 $pid 2>/dev/null; do sleep 0.01; done
     kill -s KILL $pid 2>/dev/null || break
@@ -29,17 +29,17 @@ while [ $kills -lt 20 ]; do
     [ ! -e three.ovoid ] || fail "there should be no model after a kill"
 done
 [ $kills -eq 20 ] || fail "20 kills were to be survived, not $kills"
-run "$OVOID" fit a.xyzr -o three.ovoid --part-atoms 64 --no-measure -q --checkpoint c --resume --jobs 2
+run "$OVOID" fit a.xyzr -o three.ovoid --ratio 0.05 --part-atoms 64 --no-measure -q --checkpoint c --resume --jobs 2
 expect_code 0
 cmp -s one.ovoid three.ovoid || fail "a fit that was killed $kills times should come to the same model"
 [ ! -e c ] || fail "the checkpoint should be gone when the model is there"
 
 # One that is of another fit, or in the way.
 echo no >c
-run "$OVOID" fit a.xyzr -o four.ovoid --part-atoms 64 --checkpoint c
+run "$OVOID" fit a.xyzr -o four.ovoid --ratio 0.05 --part-atoms 64 --checkpoint c
 expect_code 4
 expect_err "c is there already"
-run "$OVOID" fit a.xyzr -o four.ovoid --part-atoms 64 --checkpoint c --resume
+run "$OVOID" fit a.xyzr -o four.ovoid --ratio 0.05 --part-atoms 64 --checkpoint c --resume
 expect_err "c is no checkpoint"
 [ "$(cat c)" = no ] || fail "what is no checkpoint should stay"
 run "$OVOID" fit a.xyzr --part-atoms 10

@@ -19,7 +19,7 @@ static bool report_sampling(uint64_t points, void *user) {
 
 /* Small molecules have few points at any spacing, and so few that more of them help. The field of
  * a larger decay rate has smaller features; that of a smaller one has fewer, and as many points. */
-static double default_spacing(size_t atoms, double decay) {
+double ov_default_spacing(size_t atoms, double decay) {
     const double small = ov_tuned.sample_spacing * pow((double)atoms / ov_tuned.sample_atoms, 0.25);
     return fmin(fmax(small, ov_tuned.sample_spacing), OVOID_DEFAULT_SPACING_ADAPTIVE) *
            fmin(1.0, sqrt(0.5 / decay));
@@ -134,7 +134,7 @@ static ovoid_status prepare(ov_adaptive *f) {
         return OVOID_OK;
     ov_adaptive_forget(f); /* a part of it may be there */
     f->spacing =
-        options->spacing > 0.0 ? options->spacing : default_spacing(f->atoms, options->decay);
+        options->spacing > 0.0 ? options->spacing : ov_default_spacing(f->atoms, options->decay);
     ov_target_options_init(&targets);
     OV_TRY(sample(f, &targets));
     f->stage = "mesh";

@@ -46,6 +46,9 @@ void ov_adaptive_destroy(ov_adaptive **adaptive);
  * kernels stay. */
 void ov_adaptive_forget(ov_adaptive *adaptive);
 
+/* Of the points, where the caller asks for none, in a molecule of so many atoms, angstrom. */
+double ov_default_spacing(size_t atoms, double decay);
+
 /* How far from an atom's centre its own Gaussian can reach the isovalue, at most, angstrom. */
 double ov_surface_reach(const double *xyzr, size_t atoms, const ovoid_fit_options *options);
 

@@ -87,13 +87,14 @@ static ovoid_status step_alone(work *w) {
     ov_solver *const s = w->s;
     const cl_uint groups = w->groups;
     w->groups = 1;
-    return OV_LAUNCH(
-        w->context, &s->step, s->wide, s->wide, OV_ARG(w->count), OV_ARG(w->lambda), OV_ARG(groups),
-        OV_ARG(w->share), OV_ARG(s->state.memory), OV_ARG(s->factor.memory),
-        OV_ARG(s->moments.memory), OV_ARG(s->diagonal.memory), OV_ARG(s->block.memory),
-        OV_ARG(s->rz.memory), OV_ARG(s->p.memory), OV_ARG(s->q.memory), OV_ARG(s->x.memory),
-        OV_ARG(s->r.memory), OV_ARG(s->z.memory), OV_ARG(s->polynomial.memory),
-        OV_ARG(s->rz_next.memory), OV_ARG(s->limit.memory), OV_ARG(s->state_next.memory));
+    return OV_LAUNCH(w->context, &s->step, s->wide, s->wide, OV_ARG(w->count), OV_ARG(w->lambda),
+                     OV_ARG(groups), OV_ARG(w->share), OV_ARG(s->state.memory),
+                     OV_ARG(s->factor.memory), OV_ARG(s->moments.memory),
+                     OV_ARG(s->diagonal.memory), OV_ARG(s->block.memory), OV_ARG(s->rz.memory),
+                     OV_ARG(s->p.memory), OV_ARG(s->q.memory), OV_ARG(s->x.memory),
+                     OV_ARG(s->r.memory), OV_ARG(s->z.memory), OV_ARG(s->polynomial.memory),
+                     OV_ARG(s->rz_next.memory), OV_ARG(s->limit.memory),
+                     OV_ARG(s->state_next.memory), OV_LOCAL(s->wide * sizeof(cl_float)));
 }
 
 /* The same by many. */

@@ -331,8 +331,11 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
                             const ovoid_fit_options *options, double began, ov_found *found,
                             ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
-    ov_parts parts = {.xyzr = xyzr, .atoms = atoms, .options = options};
+    ovoid_fit_options of_parts = *options; /* the points are as close as in the whole */
+    ov_parts parts = {.xyzr = xyzr, .atoms = atoms, .options = &of_parts};
     job j = {.parts = &parts};
+    if (of_parts.spacing == 0.0)
+        of_parts.spacing = ov_default_spacing(atoms, options->decay);
     OV_TRY(prepare(context, &parts, &j));
     result->sample_seconds = ov_seconds() - began;
     OV_TRY(fit_all(context, &j));

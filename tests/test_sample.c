@@ -305,7 +305,7 @@ static void few_guards_need_little_room(void **state) {
     ov_lattice lattice;
     ov_samples samples = {0};
     uint64_t asked = 0;
-    const ov_sampling sampling = {stop_at_third, &asked};
+    const ov_sampling sampling = {.go_on = stop_at_third, .user = &asked};
     if (test_small())
         skip();
     test_check(*state, ov_lattice_create(*state, xyzr, 2, 0.1, 3.0, &lattice));
@@ -380,7 +380,7 @@ static void empty_space_between_atoms(void **state) {
     ov_samples_destroy(&samples);
     test_check(*state, ov_lattice_create(*state, xyzr, 2, 1e-4, 3.0, &lattice));
     uint64_t asked = 0; /* the refusal comes before the first piece */
-    const ov_sampling sampling = {stop_at_third, &asked};
+    const ov_sampling sampling = {.go_on = stop_at_third, .user = &asked};
     test_refused(*state, ov_sample(*state, xyzr, 2, 0.5, &lattice, everything, sampling, &samples),
                  OVOID_ERROR_LIMIT, "points at a spacing of 0.0001 angstrom, more than 2e+10; use");
     assert_int_equal(asked, 0);
@@ -408,7 +408,7 @@ static void atoms_at_the_ends_of_space(void **state) {
 static void sampling_can_be_stopped(void **state) {
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
     uint64_t asked = 0;
-    const ov_sampling sampling = {stop_at_third, &asked};
+    const ov_sampling sampling = {.go_on = stop_at_third, .user = &asked};
     const ov_band band = {.low = 0.0, .high = 2.0};
     ov_lattice lattice;
     ov_samples samples = {0};

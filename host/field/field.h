@@ -283,6 +283,10 @@ typedef struct ov_samples {
 typedef struct ov_sampling {
     bool (*go_on)(uint64_t points, void *user); /* may be NULL */
     void *user;
+    /* NULL, or a box (low, high; angstrom), that of a part of a molecule: of the lattice beyond it,
+     * the points that could be guards of the outside are kept whatever phi is, and get the value 0.
+     * What stands for the part has nothing to do there. */
+    const double (*part)[3];
 } ov_sampling;
 
 /* Evaluates phi on the lattice piece by piece and keeps the band. Where atoms are far apart, the

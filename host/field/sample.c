@@ -173,10 +173,18 @@ static bool is_kept(ov_band band, float value, const uint64_t index[3]) {
     return value >= band.low || (value >= band.outside_low && every(band.outside_every, index));
 }
 
+/* Whether a point is beyond the box of a part. */
+static bool is_beyond(const sampler *s, const double at[3]) {
+    for (size_t axis = 0; s->sampling.part && axis < 3; ++axis)
+        if (at[axis] < s->sampling.part[0][axis] || at[axis] > s->sampling.part[1][axis])
+            return true;
+    return false;
+}
+
 /* Appends point j of the brick that begins at lattice point `first`, if it is on the lattice and
  * kept. */
 static void keep_point(sampler *s, const uint64_t first[3], uint64_t j, float value, double least) {
-    if (!(value >= least))
+    if (!(value >= least) && !s->sampling.part)
         return;
     uint64_t index[3];
     ov_brick_point(j, index);
@@ -185,11 +193,15 @@ static void keep_point(sampler *s, const uint64_t first[3], uint64_t j, float va
         if (index[axis] >= s->lattice->size[axis])
             return;
     }
-    if (!is_kept(s->band, value, index))
-        return;
+    double *const at = s->kept + 3 * s->kept_count;
     for (size_t axis = 0; axis < 3; ++axis)
-        s->kept[3 * s->kept_count + axis] = coordinate(s->lattice, axis, index[axis]);
+        at[axis] = coordinate(s->lattice, axis, index[axis]);
+    const bool beyond = is_beyond(s, at);
+    if (beyond ? !every(s->band.outside_every, index) : !is_kept(s->band, value, index))
+        return;
     ++s->kept_count;
+    if (beyond)
+        return;
     s->band_count += value >= s->band.low && value <= s->band.high;
 }
 
@@ -316,6 +328,30 @@ static ovoid_status set_slice_terms(ovoid_context *context, sampler *s, const ov
     return ov_terms_set(context, &s->terms, s->quadrics, count, slice->origin, OV_TARGET_CUTOFF);
 }
 
+/* Makes the values 0 at a slice's points beyond the box of a part. */
+static ovoid_status clear_beyond(ovoid_context *context, const sampler *s, const ov_points *slice,
+                                 float *values) {
+    ovoid_status status = OVOID_OK;
+    const size_t floats = slice->packs * 3 * OV_PACK;
+    if (!s->sampling.part)
+        return OVOID_OK;
+    float *const xyz = ov_alloc(context, floats, sizeof *xyz, "packed points");
+    if (!xyz)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_buffer_read(context, &slice->xyz, 0, xyz, floats * sizeof *xyz));
+    for (size_t k = 0; k < slice->packs * OV_PACK; ++k) {
+        double at[3];
+        for (size_t axis = 0; axis < 3; ++axis)
+            at[axis] = slice->origin[axis] + (double)slice->pack_origin[4 * (k / OV_PACK) + axis] +
+                       (double)xyz[k / OV_PACK * (3 * OV_PACK) + axis * OV_PACK + k % OV_PACK];
+        if (is_beyond(s, at))
+            values[k] = 0.0f;
+    }
+cleanup:
+    free(xyz);
+    return status;
+}
+
 /* Evaluates the slice that begins at pack `first` and puts it where it belongs. */
 static ovoid_status finish_slice(ovoid_context *context, sampler *s, ov_samples *samples,
                                  size_t first, float *results) {
@@ -329,6 +365,7 @@ static ovoid_status finish_slice(ovoid_context *context, sampler *s, ov_samples 
     OV_TRY(ov_field_gradient(context, &s->operations, &slice, &s->terms, &s->lists, &s->value,
                              &s->gradient));
     OV_TRY(ov_buffer_read(context, &s->value, 0, results, values));
+    OV_TRY(clear_beyond(context, s, &slice, results));
     OV_TRY(ov_buffer_write(context, &samples->value, at, results, values));
     OV_TRY(ov_buffer_read(context, &s->gradient, 0, results, 3 * values));
     OV_TRY(ov_buffer_write(context, &samples->gradient, 3 * at, results, 3 * values));

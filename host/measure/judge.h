@@ -42,7 +42,7 @@ typedef struct ov_judge {
     ov_spot *excused;       /* owned; within `excused_reach` of these it does not count either */
     size_t excused_count;
     double excused_reach;  /* angstrom */
-    const ov_spot *wanted; /* the owner's; so near to these it does, also in a cavity */
+    const ov_spot *wanted; /* the owner's; so near to these it does in any case, in cavities too */
     size_t wanted_count;
 } ov_judge;
 

@@ -39,6 +39,18 @@ static double padding_of(const ov_adaptive *f) {
                                       ov_tuned.sample_padding / sqrt(2.0 * options->decay));
 }
 
+/* The box of a part's atoms, grown by the padding. */
+static void bound_part(const ov_adaptive *f, double padding, double part[2][3]) {
+    for (size_t k = 0; k < 3; ++k) {
+        part[0][k] = INFINITY;
+        part[1][k] = -INFINITY;
+        for (size_t i = 0; i < f->atoms; ++i) {
+            part[0][k] = fmin(part[0][k], f->xyzr[4 * i + k] - padding);
+            part[1][k] = fmax(part[1][k], f->xyzr[4 * i + k] + padding);
+        }
+    }
+}
+
 /* What is fixed takes its share of the target. */
 static ovoid_status fix_surroundings(ov_adaptive *f) {
     ovoid_status status = OVOID_OK;
@@ -69,9 +81,15 @@ static ovoid_status sample(ov_adaptive *f, const ov_target_options *targets) {
                           .inside_every = targets->inside_every,
                           .outside_low = targets->outside_low * isovalue,
                           .outside_every = targets->outside_every};
-    const ov_sampling sampling = {.go_on = report_sampling, .user = f};
+    double part[2][3], padding = padding_of(f);
+    ov_sampling sampling = {.go_on = report_sampling, .user = f};
     ov_lattice lattice;
-    OV_TRY(ov_lattice_create(f->context, f->xyzr, f->atoms, f->spacing, padding_of(f), &lattice));
+    if (f->around.atoms > 0) {
+        bound_part(f, padding, part);
+        sampling.part = (const double(*)[3])part;
+        padding += ov_tuned.part_beyond / sqrt(2.0 * options->decay);
+    }
+    OV_TRY(ov_lattice_create(f->context, f->xyzr, f->atoms, f->spacing, padding, &lattice));
     OV_TRY(ov_sample(f->context, f->xyzr, f->atoms + f->around.atoms, options->decay, &lattice,
                      band, sampling, &f->samples));
     OV_TRY(
@@ -84,7 +102,8 @@ cleanup:
     return status;
 }
 
-/* What judges are not to look at: where a model that nothing is to be held against is off. */
+/* What judges are not to look at: where the first `count` of f->quadrics, which nothing is to be
+ * held against, are off. */
 static ovoid_status excuse(ov_adaptive *f, size_t count) {
     ovoid_status status = OVOID_OK;
     ov_judge *const judge = &f->judge;
@@ -112,6 +131,8 @@ static ovoid_status judge_region(ov_adaptive *f) {
     const bool mends = f->around.spot_count > 0;
     judge->in_region = true;
     judge->excused_reach = ov_tuned.part_excused / judge->root_2d;
+    judge->wanted = f->around.spots;
+    judge->wanted_count = f->around.spot_count;
     memcpy(judge->low, f->around.low, sizeof judge->low);
     memcpy(judge->high, f->around.high, sizeof judge->high);
     if (f->options->adaptive.goal != OVOID_GOAL_TOLERANCE)
@@ -120,8 +141,6 @@ static ovoid_status judge_region(ov_adaptive *f) {
         memcpy(f->quadrics, f->start->quadrics, f->start->count * sizeof *f->quadrics);
     for (size_t i = 0; i < f->atoms && !mends; ++i)
         ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &f->quadrics[i]);
-    judge->wanted = f->around.spots;
-    judge->wanted_count = f->around.spot_count;
     return excuse(f, mends ? f->start->count : f->atoms);
 }
 

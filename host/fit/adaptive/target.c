@@ -35,8 +35,9 @@ static double root_weight(const ov_target *target, double phi, double slope) {
     return (options->floor + exp(-delta * delta)) / (slope * length);
 }
 
+/* Where phi was set to 0, beyond a part, nothing of the part is to be, whatever else is there. */
 static double fixed_at(const ov_target *target, size_t k) {
-    return target->fixed ? target->fixed[k] : 0.0;
+    return target->fixed && target->phi[k] > 0.0f ? target->fixed[k] : 0.0;
 }
 
 static void set_bounds(ov_target *target, size_t k) {

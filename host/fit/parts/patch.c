@@ -42,7 +42,7 @@ static void grow_box(ov_box *box, const double at[3], double by) {
     }
 }
 
-/* Spots whose ellipsoids may be the same ones are of one patch: of[n] is the first of them. */
+/* Spots that are in each other's reach are of one patch: of[n] is the first of them. */
 static void unite_spots(const ov_spot *spots, size_t count, double apart, uint32_t *of) {
     for (size_t n = 0; n < count; ++n)
         of[n] = (uint32_t)n;
@@ -79,7 +79,7 @@ static ovoid_status make_patches(ovoid_context *context, const ov_spot *spots, s
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    unite_spots(spots, count, 2.0 * all->reach, of);
+    unite_spots(spots, count, all->reach, of);
     for (size_t n = 0; n < count; ++n)
         of[n] = ov_union_first(of, (uint32_t)n);
     for (size_t n = 0; n < count; ++n)

@@ -32,8 +32,7 @@ static void print_work(FILE *out, const fit_job *job) {
                 plural(result->iterations), method,
                 options->l1.kernel == OVOID_KERNEL_SPHERE ? ", spheres at the atoms" : "");
     else
-        fprintf(out,
-                "fit       %llu step%s of refinement, %llu of conjugate gradients, method %s",
+        fprintf(out, "fit       %llu step%s of refinement, %llu of conjugate gradients, method %s",
                 (count)result->iterations, plural(result->iterations),
                 (count)result->adaptive.solver_iterations, method);
     if (options->method == OVOID_METHOD_ADAPTIVE && result->parts > 1)

@@ -90,11 +90,12 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
 
 /* How method adaptive cuts a molecule into parts. A part is fitted among its neighbours, those that
  * were fitted before as their ellipsoids and the others as their atoms, so that the goal holds
- * across seams; no ellipsoid stands for atoms of two parts. The model depends on the parts, never
- * on how many of them are fitted side by side. */
+ * across seams; no ellipsoid stands for atoms of two parts, but where seams were mended. The model
+ * depends on the parts, never on how many of them are fitted side by side. What begins with a
+ * model, such as the next frame of a trajectory, is fitted as a whole. */
 typedef struct ovoid_parts_options { /* 24 bytes */
     uint32_t atoms;  /* of a part at most, from OVOID_LEAST_PART_ATOMS; 0: OVOID_DEFAULT_PART_ATOMS
-                        in  a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */
+                        in a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */
     uint32_t jobs;   /* parts side by side, each with a thread and a queue of its own, at most
                         OVOID_MOST_JOBS; 0: 1 */
     uint32_t resume; /* not 0: goes on where the checkpoint ends, if there is one */

@@ -138,7 +138,7 @@ static void measure(ovoid_context *context, const ovoid_molecule *molecule,
 /* Cell by cell comes to what all at once does: pieces that run through many cells, cavities cut by
  * faces, specks. */
 static void cells_add_up(void **state) {
-    const size_t atoms = test_size(700, 200);
+    const size_t atoms = test_size(700, 400);
     ovoid_molecule *molecule = ball(*state, atoms);
     ov_quadric *const original = atoms_of(molecule, 0.0), *const moved = atoms_of(molecule, 0.6);
     ovoid_model *model = model_of(*state, moved, atoms);
@@ -213,7 +213,7 @@ static void expect_same(const ovoid_model *a, const ovoid_model *b) {
 /* The tolerance holds across seams as a measure of the whole has it, not with many more ellipsoids
  * than a fit of the whole takes, and with the same bits for any number of workers. */
 static void holds_across_seams(void **state) {
-    const size_t atoms = test_size(500, 150);
+    const size_t atoms = test_size(500, 300);
     ovoid_molecule *molecule = ball(*state, atoms);
     ovoid_fit_options options = in_parts(0, 0);
     ovoid_fit_result whole, result, again;

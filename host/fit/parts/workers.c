@@ -213,8 +213,9 @@ ovoid_status ov_parts_work(ovoid_context *context, const ov_partition *partition
     ovoid_status status = open_yard(&y);
     if (status != OVOID_OK)
         goto cleanup;
-    if (jobs > 1) {
-        status = work_together(&y, jobs);
+    if (jobs > 1 && partition->count - y.done > 1) {
+        const size_t most = partition->count - y.done;
+        status = work_together(&y, jobs < most ? jobs : most);
     } else {
         pthread_mutex_lock(&y.lock);
         work(&y, context);

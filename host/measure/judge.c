@@ -106,15 +106,11 @@ void ov_judge_destroy(ov_judge *judge) {
 
 static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
                                bool normals, ovoid_mesh **mesh) {
-    ov_body *const bodies = ov_alloc(judge->context, count, sizeof *bodies, "ellipsoids");
-    if (!bodies)
-        return OVOID_ERROR_MEMORY;
-    for (size_t i = 0; i < count; ++i) {
-        ovoid_ellipsoid ellipsoid;
-        ov_ellipsoid_of_quadric(&quadrics[i], &ellipsoid);
-        ov_body_of_ellipsoid(&ellipsoid, &bodies[i]);
-    }
-    const ovoid_status status = mesh_bodies(judge, bodies, count, normals, mesh);
+    ov_body *bodies = NULL;
+    ovoid_status status = ov_bodies_of_quadrics(judge->context, quadrics, count, &bodies);
+    if (status != OVOID_OK)
+        return status;
+    status = mesh_bodies(judge, bodies, count, normals, mesh);
     free(bodies);
     if (status != OVOID_ERROR_LIMIT)
         return status;

@@ -52,14 +52,8 @@ static ovoid_status mesh_sheet(surveyor *s, const ov_quadric *quadrics, size_t c
     ovoid_mesh_options_init(&meshing, sizeof meshing);
     meshing.isovalue = s->options->isovalue;
     meshing.spacing = s->options->spacing;
-    ov_body *const bodies = ov_alloc(s->context, count, sizeof *bodies, "ellipsoids");
-    if (!bodies)
-        return OVOID_ERROR_MEMORY;
-    for (size_t i = 0; i < count; ++i) {
-        ovoid_ellipsoid ellipsoid;
-        ov_ellipsoid_of_quadric(&quadrics[i], &ellipsoid);
-        ov_body_of_ellipsoid(&ellipsoid, &bodies[i]);
-    }
+    ov_body *bodies = NULL;
+    OV_TRY(ov_bodies_of_quadrics(s->context, quadrics, count, &bodies));
     status = count == 0 ? OVOID_ERROR_EMPTY
                         : ov_mesh_bodies_light(s->context, s->marcher, bodies, count, &meshing,
                                                s->origin, NULL, true, &made->mesh);

@@ -3,6 +3,7 @@
 #include "field/bricks.h"
 #include "field/work.h"
 #include "model/ellipsoid.h"
+#include "model/factor.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -35,6 +36,20 @@ void ov_body_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_body *body) {
     }
     body->least =
         1.0 / sqrt(fmax(fmax(ellipsoid->decay[0], ellipsoid->decay[1]), ellipsoid->decay[2]));
+}
+
+ovoid_status ov_bodies_of_quadrics(ovoid_context *context, const ov_quadric *quadrics, size_t count,
+                                   ov_body **bodies) {
+    ov_body *const made = ov_alloc(context, count, sizeof *made, "ellipsoids");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < count; ++i) {
+        ovoid_ellipsoid ellipsoid;
+        ov_ellipsoid_of_quadric(&quadrics[i], &ellipsoid);
+        ov_body_of_ellipsoid(&ellipsoid, &made[i]);
+    }
+    *bodies = made;
+    return OVOID_OK;
 }
 
 double ov_body_reach(const ov_body *body, double value) {

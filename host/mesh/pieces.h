@@ -21,6 +21,10 @@ void ov_body_of_atom(const double xyzr[4], double decay, ov_body *body);
 void ov_body_of_ball(const ov_quadric *quadric, double decay, ov_body *body);
 void ov_body_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_body *body);
 
+/* Those of ellipsoids given as quadrics, to be freed. */
+ovoid_status ov_bodies_of_quadrics(ovoid_context *context, const ov_quadric *quadrics, size_t count,
+                                   ov_body **bodies);
+
 /* The s up to which a term is at least `value`; negative where it nowhere is. */
 double ov_body_reach(const ov_body *body, double value);
 

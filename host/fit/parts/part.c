@@ -6,6 +6,13 @@
 #include <math.h>
 #include <stdlib.h>
 
+void ov_part_count_work(const ovoid_fit_result *one, ovoid_fit_result *all) {
+    all->iterations += one->iterations;
+    all->adaptive.solver_iterations += one->adaptive.solver_iterations;
+    for (size_t n = 0; n < OVOID_COUNTS; ++n)
+        all->counts[n] += one->counts[n];
+}
+
 ovoid_status ov_part_take_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
                                 ov_part_fit *fit) {
     const ov_part *const part = &parts->partition.part[p];
@@ -46,10 +53,6 @@ cleanup:
     return status;
 }
 
-static bool is_of_earlier_colour(const ov_parts *parts, size_t p, size_t neighbour) {
-    return parts->partition.part[neighbour].colour < parts->partition.part[p].colour;
-}
-
 ovoid_status ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p, size_t done,
                                ov_part_fit *fit) {
     ovoid_status status = OVOID_OK;
@@ -58,7 +61,7 @@ ovoid_status ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, si
     ov_part_fit made = {0};
     const ov_part *const part = &parts->partition.part[p];
     ovoid_fit_result_init(&made.result, sizeof made.result);
-    OV_TRY(ov_scene_of_part(context, parts, p, is_of_earlier_colour, &scene));
+    OV_TRY(ov_scene_of_part(context, parts, p, &scene));
     around = ov_scene_surround(parts, &scene, part->count, &part->box, done);
     status = fit_scene(context, parts, p, &scene, &around, &made);
     if (status == OVOID_ERROR_EMPTY) /* it has no part in the surface */

@@ -39,6 +39,9 @@ static inline const double *ov_part_atom(const ov_parts *parts, size_t p, size_t
 ovoid_status ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p, size_t done,
                                ov_part_fit *fit);
 
+/* Adds the steps and counts of one fit to those of all. */
+void ov_part_count_work(const ovoid_fit_result *one, ovoid_fit_result *all);
+
 /* Surveys its cell, when all parts are done. */
 ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_t p,
                             ov_survey_cell *cell);

@@ -102,12 +102,9 @@ static void add_result(const ovoid_fit_result *one, ovoid_fit_result *all) {
     if (one->points == OVOID_UNKNOWN)
         return; /* the atoms themselves: nothing was done */
     all->points += one->points;
-    all->iterations += one->iterations;
-    all->adaptive.solver_iterations += one->adaptive.solver_iterations;
     all->distance = one->distance > all->distance || all->distance != all->distance ? one->distance
                                                                                     : all->distance;
-    for (size_t n = 0; n < OVOID_COUNTS; ++n)
-        all->counts[n] += one->counts[n];
+    ov_part_count_work(one, all);
 }
 
 static void add_results(const ov_parts *parts, ovoid_fit_result *result) {

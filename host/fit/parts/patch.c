@@ -250,12 +250,8 @@ static ovoid_status replace(ovoid_context *context, patches *all) {
 static void count_work(const patches *all, ovoid_fit_result *result) {
     for (size_t p = 0; p < all->cut.count; ++p) {
         const ovoid_fit_result *const one = &all->patch[p].fit.result;
-        if (!all->todo[p] || one->iterations == OVOID_UNKNOWN)
-            continue;
-        result->iterations += one->iterations;
-        result->adaptive.solver_iterations += one->adaptive.solver_iterations;
-        for (size_t n = 0; n < OVOID_COUNTS; ++n)
-            result->counts[n] += one->counts[n];
+        if (all->todo[p] && one->iterations != OVOID_UNKNOWN)
+            ov_part_count_work(one, result);
     }
 }
 
@@ -278,14 +274,12 @@ ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t job
     patches all = {.parts = parts,
                    .cut = {.near = 2.0 * parts->partition.near},
                    .reach = ov_tuned.patch_reach * length};
-    const ov_part_work work = {.todo = NULL, .task = task, .user = &all};
     OV_TRY(make_patches(context, spots, count, &all));
     for (uint32_t colour = 0; colour < all.cut.colours; ++colour) {
-        ov_part_work now = work;
-        now.todo = all.todo;
+        const ov_part_work work = {.todo = all.todo, .task = task, .user = &all};
         for (size_t p = 0; p < all.cut.count; ++p)
             all.todo[p] = all.cut.part[p].colour == colour;
-        OV_TRY(ov_parts_work(context, &all.cut, jobs, &now));
+        OV_TRY(ov_parts_work(context, &all.cut, jobs, &work));
         OV_TRY(replace(context, &all));
         count_work(&all, result);
     }

@@ -35,14 +35,15 @@ static ovoid_status add_atoms(ovoid_context *context, const ov_parts *parts, con
     ovoid_status status = OVOID_OK;
     for (size_t n = 0; n < parts->partition.part[q].count; ++n) {
         const double *const atom = ov_part_atom(parts, q, n);
-        ov_quadric quadric;
         felt[n] = ov_box_near(box, atom, parts->reach);
         if (!felt[n])
             continue;
         OV_TRY(ov_scene_add_atom(context, atom, s));
-        ov_quadric_of_atom(atom, parts->options->decay, &quadric);
-        if (!done)
+        if (!done) {
+            ov_quadric quadric;
+            ov_quadric_of_atom(atom, parts->options->decay, &quadric);
             OV_TRY(add_term(context, &quadric, s));
+        }
     }
 cleanup:
     return status;
@@ -95,7 +96,6 @@ cleanup:
 }
 
 ovoid_status ov_scene_of_part(ovoid_context *context, const ov_parts *parts, size_t p,
-                              bool (*done)(const ov_parts *parts, size_t p, size_t neighbour),
                               ov_scene *scene) {
     ovoid_status status = OVOID_OK;
     const ov_partition *const cut = &parts->partition;
@@ -103,7 +103,8 @@ ovoid_status ov_scene_of_part(ovoid_context *context, const ov_parts *parts, siz
         OV_TRY(ov_scene_add_atom(context, ov_part_atom(parts, p, n), scene));
     for (size_t q = 0; q < cut->count; ++q)
         if (q != p && ov_parts_near(cut, p, q))
-            OV_TRY(add_part(context, parts, &cut->part[p].box, q, done(parts, p, q), scene));
+            OV_TRY(add_part(context, parts, &cut->part[p].box, q,
+                            cut->part[q].colour < cut->part[p].colour, scene));
 cleanup:
     return status;
 }

@@ -13,9 +13,9 @@ typedef struct ov_scene {
     size_t atoms, atoms_capacity, model_count, model_capacity;
 } ov_scene;
 
-/* Part p among its neighbours, the `done` of which are in the model as their ellipsoids. */
+/* Part p among its neighbours, of which those of earlier colours are in the model as their
+ * ellipsoids, the others as their atoms. */
 ovoid_status ov_scene_of_part(ovoid_context *context, const ov_parts *parts, size_t p,
-                              bool (*done)(const ov_parts *parts, size_t p, size_t neighbour),
                               ov_scene *scene);
 
 /* What is about a box when all parts are done, without the ellipsoids of the model for which chosen

@@ -82,11 +82,9 @@ static cl_int call_to_context(cl_context context) {
 
 /* ---- the calls ---------------------------------------------------------------------------- */
 
-cl_context CL_API_CALL clCreateContext(const cl_context_properties *properties, cl_uint count,
-                                       const cl_device_id *ids,
-                                       void(CL_CALLBACK *tell)(const char *, const void *, size_t,
-                                                               void *),
-                                       void *user, cl_int *code) {
+cl_context CL_API_CALL clCreateContext(
+    const cl_context_properties *properties, cl_uint count, const cl_device_id *ids,
+    void(CL_CALLBACK *tell)(const char *, const void *, size_t, void *), void *user, cl_int *code) {
     atomic_fetch_add(&lost.contexts, 1);
     const cl_int refused = call_to(ids[0]);
     if (refused == CL_SUCCESS)

@@ -348,7 +348,7 @@ static void a_lost_device_changes_no_bits(void **state) {
     case_of c;
     (void)state;
     begin_case(&c, OVOID_GOAL_RATIO);
-    for (size_t k = 0; k < sizeof cases / sizeof *cases; ++k) {
+    for (size_t k = test_small() ? 3 : 0; k < sizeof cases / sizeof *cases; ++k) {
         reopen(&c, "1,2");
         lose_device(cases[k].place, cases[k].at, cases[k].code);
         expect_same_fit(&c);

@@ -1355,7 +1355,11 @@ static int list_child(void) {
     ovoid_context *context = NULL;
     if (ovoid_context_create(&context) != OVOID_OK)
         return 1;
-    printf("before: %zu\n", ovoid_context_device_count(context));
+    ovoid_device_info *devices = NULL;
+    size_t there = 0;
+    ovoid_devices(context, sizeof *devices, &devices, &there);
+    ovoid_free(devices);
+    printf("there: %zu\nbefore: %zu\n", there, ovoid_context_device_count(context));
     if (ovoid_context_open_device(context, "1,0") != OVOID_OK)
         printf("%s\n", ovoid_context_error(context));
     const size_t count = ovoid_context_device_count(context);
@@ -1374,7 +1378,7 @@ static void test_remembered_list(void **state) {
     (void)state;
     skip_on("Oclgrind", "it stands in for the loader");
     char *text = CHILD("list", "POCL_DEVICES=pthread pthread");
-    if (!strstr(text, "after: 2"))
+    if (strstr(text, "there: 0\n") || strstr(text, "there: 1\n"))
         skip();
     assert_contains(text, "before: 0\nafter: 2\nindex: 1\nindex: 0\nbeyond: 1\nown: 1\nthen: 1");
     free(text);

@@ -150,8 +150,8 @@ static ovoid_status hand_over(ovoid_context *context, const ov_found *found, siz
 }
 
 static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *options,
-                                 double began, ovoid_ellipsoid **ellipsoids, uint32_t **owner,
-                                 ovoid_fit_result *result) {
+                                 double began, ov_ranks *ranks, ovoid_ellipsoid **ellipsoids,
+                                 uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = fitter->context;
     ov_found found = {0};
@@ -160,8 +160,8 @@ static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *
     if (!in_parts && !fitter->adaptive)
         OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, NULL, !fitter->once,
                                   &fitter->adaptive));
-    status = in_parts ? ov_parts_reach(context, fitter->xyzr, fitter->atoms, options, began, &found,
-                                       result)
+    status = in_parts ? ov_parts_reach(context, fitter->xyzr, fitter->atoms, options, began, ranks,
+                                       &found, result)
                       : ov_adaptive_reach(fitter->adaptive, options,
                                           fitter->start.count > 0 ? &fitter->start : NULL, began,
                                           &found, result);
@@ -179,10 +179,18 @@ cleanup:
     return status;
 }
 
+static uint64_t hash_start(const ov_found *start) {
+    return start->count > 0 ? ov_hash(start->quadrics, start->count * sizeof *start->quadrics) : 0;
+}
+
 static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, double began,
                         ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
+    ov_ranks ranks = {0};
+    if (options->method == OVOID_METHOD_ADAPTIVE)
+        OV_TRY(ov_ranks_begin(fitter->context, options, fitter->xyzr, fitter->atoms,
+                              hash_start(&fitter->start), &ranks));
     OV_TRY(ov_fit_options_check(fitter->context, options));
     ov_progress_fit(fitter->context, options->method);
     result->method = options->method;
@@ -190,9 +198,9 @@ static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, 
     OV_TRY(ov_device_get(fitter->context, &device));
     OV_TRY(options->method == OVOID_METHOD_L1
                ? fit_l1(fitter, options, began, ellipsoids, owner, result)
-               : fit_adaptive(fitter, options, began, ellipsoids, owner, result));
+               : fit_adaptive(fitter, options, began, &ranks, ellipsoids, owner, result));
 cleanup:
-    return status;
+    return ov_ranks_end(fitter->context, &ranks, status);
 }
 
 /* The model of what was found, and the last of the result. */

@@ -5,14 +5,16 @@
 #define OV_FIT_PARTS_H
 
 #include "fit/adaptive/adaptive.h"
+#include "fit/parts/ranks.h"
 
 /* Whether so many atoms are fitted in parts. */
 bool ov_parts_wanted(const ovoid_fit_options *options, size_t atoms);
 
 /* As ov_adaptive_reach() from the atoms. The parts that are done when it is stopped, with the
- * others' atoms as they are, are what held, where a tolerance is the goal. */
+ * others' atoms as they are, are what held, where a tolerance is the goal. On all ranks that share
+ * it, it comes to the same. */
 ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t atoms,
-                            const ovoid_fit_options *options, double began, ov_found *found,
-                            ovoid_fit_result *result);
+                            const ovoid_fit_options *options, double began, ov_ranks *ranks,
+                            ov_found *found, ovoid_fit_result *result);
 
 #endif

@@ -72,7 +72,7 @@ static void set_failure(yard *y, ovoid_context *context, ovoid_status status) {
 /* Works on part p with the yard's lock open meanwhile. */
 static void work_on(yard *y, ovoid_context *context, size_t p) {
     const ov_part_work *const work = y->work;
-    const size_t done = y->done;
+    const size_t done = y->done - work->elsewhere;
     y->taken[p] = true;
     pthread_mutex_unlock(&y->lock);
     ovoid_status status = work->task(context, p, done, work->user);
@@ -149,7 +149,7 @@ static void watch(yard *y) {
         if (y->stop || !y->latest.stage)
             continue;
         ovoid_progress told = y->latest;
-        told.done = y->done;
+        told.done = y->done - y->work->elsewhere;
         told.total = y->partition->count;
         pthread_mutex_unlock(&y->lock);
         const bool go_on = ov_progress_report(y->context, &told);

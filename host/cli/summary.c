@@ -1,4 +1,5 @@
 #include "fit.h"
+#include "ranks.h"
 
 #include <math.h>
 #include <string.h>
@@ -37,6 +38,8 @@ static void print_work(FILE *out, const fit_job *job) {
                 (count)result->adaptive.solver_iterations, method);
     if (options->method == OVOID_METHOD_ADAPTIVE && result->parts > 1)
         fprintf(out, ", %llu parts", (count)result->parts);
+    if (job->shared)
+        fprintf(out, ", %u ranks", (unsigned)ranks_count());
     if (options->method == OVOID_METHOD_ADAPTIVE)
         putc('\n', out);
 }

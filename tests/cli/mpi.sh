@@ -4,6 +4,7 @@ command -v mpirun >/dev/null || skip "no mpirun"
 need_device
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
+export OMPI_MCA_btl_vader_single_copy_mechanism=none # containers forbid it
 unset OVOID_DEVICE
 ranks() { # N COMMAND...
     number=$1
@@ -70,7 +71,7 @@ expect_files a.xyzr b.xyzr one.ovoid
 # A rank is killed when there is another part on file, once each; then the others go on for them.
 size_of() { wc -c <"$1" 2>/dev/null || echo 0; }
 process_of() { # RANK, of the mpirun $pid
-    for child in $(ps -o pid= --ppid $pid); do
+    for child in $(cat /proc/$pid/task/*/children 2>/dev/null); do
         tr '\0' '\n' <"/proc/$child/environ" 2>/dev/null | grep -qx "OMPI_COMM_WORLD_RANK=$1" && echo "$child"
     done
 }

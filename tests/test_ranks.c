@@ -230,7 +230,7 @@ static void expect_models(const ovoid_model *model, const ovoid_fit_result *resu
 
 /* The bits of one process, each part fitted by one rank alone, and none idle. */
 static void all_ranks_come_to_the_model_of_one(void **state) {
-    ovoid_molecule *molecule = rod(*state, 500);
+    ovoid_molecule *molecule = rod(*state, test_size(500, 300));
     ovoid_fit_options options = in_parts(64);
     ovoid_fit_result result;
     ovoid_model *model = NULL;

@@ -233,36 +233,32 @@ static ovoid_status compare(ovoid_context *context, ov_ranks *r, const hello *al
     return OVOID_OK;
 }
 
-static ovoid_status greet(ovoid_context *context, ov_ranks *r, const hello *mine) {
-    ovoid_status status = OVOID_OK;
-    hello *const all = ov_alloc(context, ranks_of(r), sizeof *all, "ranks");
-    if (!all)
-        return OVOID_ERROR_MEMORY;
-    for (uint32_t n = 0; n < ranks_of(r); ++n)
-        r->sizes[n] = sizeof *mine;
-    OV_TRY(call(context, r, mine, all, r->sizes));
-    OV_TRY(compare(context, r, all));
-cleanup:
-    free(all);
-    return status;
-}
-
+/* Whatever fails before all have greeted each other leaves the others waiting: memory for it is
+ * there when it begins. */
 ovoid_status ov_ranks_begin(ovoid_context *context, const ovoid_fit_options *options,
                             const double *xyzr, size_t atoms, uint64_t start, ov_ranks *ranks) {
     ovoid_status status = OVOID_OK;
     const ovoid_exchange *const exchange = options->parts.exchange;
+    hello *all = NULL;
     if (!exchange)
         return OVOID_OK;
     OV_TRY(ov_exchange_check(context, exchange));
     ranks->sizes = ov_alloc(context, 3 * (size_t)exchange->ranks, sizeof *ranks->sizes, "ranks");
-    if (!ranks->sizes)
-        return OVOID_ERROR_MEMORY;
+    all = ov_alloc(context, exchange->ranks, sizeof *all, "ranks");
+    if (!ranks->sizes || !all) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
     ranks->exchange = exchange;
     hello mine = hello_of(options, xyzr, atoms, start);
     const ovoid_status opened = ov_device_hash(context, &mine.device);
-    OV_TRY(greet(context, ranks, &mine));
+    for (uint32_t n = 0; n < exchange->ranks; ++n)
+        ranks->sizes[n] = sizeof mine;
+    OV_TRY(call(context, ranks, &mine, all, ranks->sizes));
+    OV_TRY(compare(context, ranks, all));
     status = opened; /* said at the end, where it failed */
 cleanup:
+    free(all);
     return status;
 }
 

@@ -180,6 +180,18 @@ cleanup:
     return status;
 }
 
+void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
+                           ov_content *content) {
+    double a[3], u[3], v[3], normal[3];
+    corners_at(mesh, triangle, a, u, v);
+    subtract(u, a, u);
+    subtract(v, a, v);
+    subtract(a, origin, a);
+    cross(u, v, normal);
+    content->area += 0.5 * sqrt(dot(normal, normal));
+    content->volume += dot(a, normal) / 6.0;
+}
+
 /* Flat areas and volumes. Each component has its own origin, one of its vertices, so that little
  * cancels; where it is closed the origin does not matter. */
 static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh) {
@@ -191,15 +203,12 @@ static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh)
         first[mesh->component_of[v]] = (uint32_t)v;
     for (size_t t = 0; t < mesh->triangles; ++t) {
         const uint32_t c = mesh->component_of[mesh->corners[3 * t]];
-        double origin[3], a[3], u[3], v[3], normal[3];
+        ov_content content = {mesh->component[c].area, mesh->component[c].volume};
+        double origin[3];
         ov_mesh_at(mesh, first[c], origin);
-        corners_at(mesh, t, a, u, v);
-        subtract(u, a, u);
-        subtract(v, a, v);
-        subtract(a, origin, a);
-        cross(u, v, normal);
-        mesh->component[c].area += 0.5 * sqrt(dot(normal, normal));
-        mesh->component[c].volume += dot(a, normal) / 6.0;
+        ov_mesh_flat_triangle(mesh, t, origin, &content);
+        mesh->component[c].area = content.area;
+        mesh->component[c].volume = content.volume;
     }
     for (size_t c = 0; c < mesh->components; ++c)
         mesh->component[c].outer = mesh->component[c].volume > 0.0;

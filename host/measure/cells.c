@@ -48,19 +48,6 @@ static void destroy(job *j) {
     ov_survey_standing_destroy(&j->standing);
 }
 
-/* Volumes count from the middle of all. */
-static void find_middle(job *j) {
-    const ov_partition *const cut = &j->shelf[j->lead].cut;
-    for (size_t k = 0; k < 3; ++k) {
-        double low = INFINITY, high = -INFINITY;
-        for (size_t c = 0; c < cut->count; ++c) {
-            low = fmin(low, cut->part[c].box.low[k]);
-            high = fmax(high, cut->part[c].box.high[k]);
-        }
-        j->options.about[k] = 0.5 * low + 0.5 * high;
-    }
-}
-
 static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES], size_t most) {
     ovoid_status status = OVOID_OK;
     const double least = OV_MARCH_CUTOFF * j->options.isovalue;
@@ -70,7 +57,6 @@ static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES], 
         OV_TRY(ov_shelf_create(j->context, fields[n], n == j->lead ? most : SHELF, least,
                                &j->shelf[n]));
     }
-    find_middle(j);
     j->cells = j->shelf[j->lead].cut.count;
     j->cell = ov_alloc(j->context, j->cells, sizeof *j->cell, "cells of a surface");
     j->late = ov_alloc(j->context, j->cells, sizeof *j->late, "cells of a surface");

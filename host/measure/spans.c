@@ -201,18 +201,20 @@ static uint8_t stands_at(const ov_sheet *at, size_t triangle) {
     return at->stands[at->group_of[at->mesh->corners[3 * triangle]]];
 }
 
-typedef enum choice { SOURCES, TARGETS } choice;
+typedef enum choice { SOURCES, TARGETS, OUTER_SOURCES, OUTER_TARGETS, OTHER_TARGETS } choice;
 
 /* Those in the cell, which are measured from, or those whose places are known, which are measured
- * to: of the whole surface, or of what is known of the outer one. */
-static ovoid_status choose(ov_surveyor *s, size_t n, choice what, bool outer, ov_trail *trail) {
+ * to: of the whole surface, of what is known of the outer one, or of what is left. */
+static ovoid_status choose(ov_surveyor *s, size_t n, choice what, ov_trail *trail) {
     const ov_sheet *const at = &s->sheet[n];
-    const uint8_t least = what == SOURCES ? OV_ZONE_CELL : OV_ZONE_HALO;
+    const bool from = what == SOURCES || what == OUTER_SOURCES;
+    const bool all = what == SOURCES || what == TARGETS;
     bool *const chosen = ov_alloc(s->context, at->mesh->triangles, sizeof *chosen, "triangles");
     if (!chosen)
         return OVOID_ERROR_MEMORY;
     for (size_t t = 0; t < at->mesh->triangles; ++t)
-        chosen[t] = at->zone[t] >= least && (!outer || stands_at(at, t) == OV_STANDS_OUTER);
+        chosen[t] = at->zone[t] >= (from ? OV_ZONE_CELL : OV_ZONE_HALO) &&
+                    (all || (stands_at(at, t) == OV_STANDS_OUTER) == (what != OTHER_TARGETS));
     const ovoid_status status = ov_trail_choose(s->context, at->mesh, chosen, trail);
     free(chosen);
     return status;
@@ -290,60 +292,150 @@ cleanup:
     return status;
 }
 
-/* squared gets the distances of a trail's points from the triangles of another one. */
-static ovoid_status measure_trail(ov_surveyor *s, const ov_trail *from, const ov_trail *to,
+/* ---- measuring ------------------------------------------------------------------------------- */
+
+/* squared gets the distances of these points from the triangles of side n that are chosen. */
+static ovoid_status measure_sites(ov_surveyor *s, size_t n, choice what, const ov_sites *sites,
                                   float *squared) {
     ovoid_status status = OVOID_OK;
-    const ov_sites sites = {.count = from->vertices + from->triangles, .trail = from};
-    if (!to || to->triangles == 0) {
-        for (size_t k = 0; k < sites.count; ++k)
-            squared[k] = INFINITY;
+    ov_trail to = {0};
+    for (size_t k = 0; k < sites->count; ++k)
+        squared[k] = INFINITY;
+    if (!s->sheet[n].mesh || sites->count == 0)
         return OVOID_OK;
-    }
-    OV_TRY(ov_facets_set(s->context, &s->facets, to, s->origin));
-    OV_TRY(ov_facets_distances(s->context, &s->meter, &s->facets, &sites, squared));
+    OV_TRY(choose(s, n, what, &to));
+    if (to.triangles == 0)
+        goto cleanup;
+    OV_TRY(ov_facets_set(s->context, &s->facets, &to, s->origin));
+    OV_TRY(ov_facets_distances(s->context, &s->meter, &s->facets, sites, squared));
 cleanup:
+    ov_trail_destroy(&to);
     return status;
 }
 
-/* From side n to the whole other surface, or its outer components. Without any cavity within reach
- * of either both are the same, and one look will do: same_outer. */
-static ovoid_status span_sides(ov_surveyor *s, size_t n, bool outer, bool same_outer,
-                               ov_survey_cell *cell) {
+/* What a distance has to become less by so as to have come from another triangle. */
+#define NEARER_SHARE 1e-5f
+#define NEARER_LEAST 1e-9f /* angstrom^2 */
+
+static float a_little_more(float squared) {
+    return squared + NEARER_SHARE * squared + NEARER_LEAST;
+}
+
+/* near[k]: whether the nearest triangle of side n may be one that is not of an outer component. */
+static ovoid_status find_others(ov_surveyor *s, size_t n, const ov_sites *sites,
+                                const float *squared, bool *near) {
+    ovoid_status status = OVOID_OK;
+    ov_trail to = {0};
+    float *const bound = ov_alloc(s->context, sites->count, sizeof *bound, "distances");
+    if (!bound)
+        return OVOID_ERROR_MEMORY;
+    for (size_t k = 0; k < sites->count; ++k)
+        bound[k] = a_little_more(squared[k]);
+    OV_TRY(choose(s, n, OTHER_TARGETS, &to));
+    OV_TRY(ov_facets_set(s->context, &s->facets, &to, s->origin));
+    OV_TRY(ov_facets_nearer(s->context, &s->meter, &s->facets, sites, bound));
+    for (size_t k = 0; k < sites->count; ++k)
+        near[k] = bound[k] < a_little_more(squared[k]);
+cleanup:
+    ov_trail_destroy(&to);
+    free(bound);
+    return status;
+}
+
+/* Place k of the points of a trail, relative to the origin. */
+static void place_of(const ov_surveyor *s, const ov_trail *trail, size_t k, float place[3]) {
+    double at[3];
+    if (k < trail->vertices)
+        ov_mesh_at(trail->mesh, ov_trail_vertex(trail, k), at);
+    else
+        ov_mesh_centre(trail->mesh, ov_trail_triangle(trail, k - trail->vertices), at);
+    for (size_t axis = 0; axis < 3; ++axis)
+        place[axis] = (float)(at[axis] - s->origin[axis]);
+}
+
+/* Measures those for which again holds anew, to outer components alone. */
+static ovoid_status measure_again(ov_surveyor *s, size_t n, const ov_trail *from, const bool *again,
+                                  float *squared) {
+    ovoid_status status = OVOID_OK;
+    const size_t count = from->vertices + from->triangles;
+    size_t chosen = 0, next = 0;
+    float *xyz = NULL, *found = NULL;
+    for (size_t k = 0; k < count; ++k)
+        chosen += again[k];
+    xyz = ov_alloc(s->context, 3 * chosen, sizeof *xyz, "points of a mesh");
+    found = ov_alloc(s->context, chosen, sizeof *found, "distances");
+    if (!xyz || !found) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    for (size_t k = 0; k < count; ++k)
+        if (again[k])
+            place_of(s, from, k, xyz + 3 * next++);
+    const ov_sites sites = {.count = chosen, .xyz = xyz};
+    OV_TRY(measure_sites(s, n, OUTER_TARGETS, &sites, found));
+    next = 0;
+    for (size_t k = 0; k < count; ++k)
+        if (again[k])
+            squared[k] = found[next++];
+cleanup:
+    free(xyz);
+    free(found);
+    return status;
+}
+
+/* Whether all of a surface within reach is of outer components, as far as is known. */
+static bool is_all_outer(const ov_sheet *at) {
+    for (size_t g = 0; at->mesh && g < at->groups; ++g)
+        if (at->stands[g] != OV_STANDS_OUTER)
+            return false;
+    return true;
+}
+
+/* From distances to the whole other surface to those from its outer components: most are the same.
+ */
+static ovoid_status leave_others_out(ov_surveyor *s, const span *of, float *squared) {
+    ovoid_status status = OVOID_OK;
+    const size_t other = 1 - of->side;
+    const ov_sites sites = {.count = of->from->vertices + of->from->triangles, .trail = of->from};
+    bool *near = NULL;
+    if (is_all_outer(&s->sheet[other]))
+        return OVOID_OK;
+    near = ov_alloc(s->context, sites.count, sizeof *near, "distances");
+    if (!near)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(find_others(s, other, &sites, squared, near));
+    OV_TRY(measure_again(s, other, of->from, near, squared));
+cleanup:
+    free(near);
+    return status;
+}
+
+/* From side n to the other surface (whole), and to its outer components. */
+static ovoid_status span_sides(ov_surveyor *s, size_t n, bool whole, ov_survey_cell *cell) {
     ovoid_status status = OVOID_OK;
     const ov_sheet *const other = &s->sheet[1 - n];
-    ov_trail from = {0}, to = {0};
-    span of = {.side = n, .outer = outer, .from = &from, .cell = cell};
+    ov_trail from = {0};
+    span of = {.side = n, .from = &from, .reach = s->options->halo, .cell = cell};
     float *squared = NULL;
-    OV_TRY(choose(s, n, SOURCES, outer, &from));
-    if (other->mesh)
-        OV_TRY(choose(s, 1 - n, TARGETS, outer, &to));
-    squared = ov_alloc(s->context, from.vertices + from.triangles, sizeof *squared, "distances");
+    OV_TRY(choose(s, n, whole ? SOURCES : OUTER_SOURCES, &from));
+    const ov_sites sites = {.count = from.vertices + from.triangles, .trail = &from};
+    of.squared = squared = ov_alloc(s->context, sites.count, sizeof *squared, "distances");
     if (!squared) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    OV_TRY(measure_trail(s, &from, other->mesh ? &to : NULL, squared));
-    of.squared = squared;
-    of.reach = outer && other->mesh ? other->reach : s->options->halo;
-    OV_TRY(add_sites(s, &of));
-    if (same_outer) {
-        of.outer = true;
+    OV_TRY(measure_sites(s, 1 - n, whole ? TARGETS : OUTER_TARGETS, &sites, squared));
+    if (whole) {
         OV_TRY(add_sites(s, &of));
+        OV_TRY(leave_others_out(s, &of, squared));
     }
+    of.outer = true;
+    of.reach = other->mesh ? other->reach : s->options->halo;
+    OV_TRY(add_sites(s, &of));
 cleanup:
     ov_trail_destroy(&from);
-    ov_trail_destroy(&to);
     free(squared);
     return status;
-}
-
-/* Whether all triangles of a surface within reach are of outer components. */
-static bool is_all_outer(const ov_sheet *at) {
-    for (size_t g = 0; g < at->groups; ++g)
-        if (at->stands[g] != OV_STANDS_OUTER)
-            return false;
-    return true;
 }
 
 ovoid_status ov_spans_add(ov_surveyor *s, bool whole, const ov_survey_standing *standing,
@@ -351,15 +443,9 @@ ovoid_status ov_spans_add(ov_surveyor *s, bool whole, const ov_survey_standing *
     ovoid_status status = OVOID_OK;
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         OV_TRY(find_groups(s, n, standing, &cell->side[n]));
-    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
-        const bool same = whole && (!s->sheet[1 - n].mesh || is_all_outer(&s->sheet[1 - n]));
-        if (!s->sheet[n].mesh || s->sheet[n].pieces == 0)
-            continue;
-        if (whole)
-            OV_TRY(span_sides(s, n, false, same, cell));
-        if (!same)
-            OV_TRY(span_sides(s, n, true, false, cell));
-    }
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
+        if (s->sheet[n].mesh && s->sheet[n].pieces > 0)
+            OV_TRY(span_sides(s, n, whole, cell));
 cleanup:
     return status;
 }
@@ -397,11 +483,11 @@ static ovoid_status seek_one(ov_surveyor *s, size_t n, bool outer, const ov_trai
         if (far[k]->side != n && far[k]->outer == outer) {
             for (size_t axis = 0; axis < 3; ++axis)
                 xyz[3 * sites + axis] = (float)(far[k]->at[axis] - s->origin[axis]);
-            ++sites;
+            squared[sites++] = (float)(far[k]->distance * far[k]->distance);
         }
     const ov_sites from = {.count = sites, .xyz = xyz};
     OV_TRY(ov_facets_set(s->context, &s->facets, to, s->origin));
-    OV_TRY(ov_facets_distances(s->context, &s->meter, &s->facets, &from, squared));
+    OV_TRY(ov_facets_nearer(s->context, &s->meter, &s->facets, &from, squared));
     for (size_t k = 0, site = 0; k < count; ++k)
         if (far[k]->side != n && far[k]->outer == outer) {
             far[k]->distance = fmin(far[k]->distance, sqrt((double)squared[site]));

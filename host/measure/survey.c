@@ -159,16 +159,20 @@ static void find_pieces(ov_sheet *at) {
     at->pieces = count;
 }
 
+/* Each piece has a place of its own that its volume counts from: what rounding leaves open between
+ * cells is little beside a cavity then, however far from everything's middle it is. */
 static void add_contents(const ov_surveyor *s, const ov_sheet *at, ov_survey_side *side) {
+    const bool exact = s->options->vertices == OVOID_VERTEX_EXACT;
+    for (size_t v = 0; v < at->mesh->vertices; ++v)
+        if (at->piece_of[v] != OV_NO_PIECE)
+            ov_mesh_at(at->mesh, v, side->piece[at->piece_of[v]].at);
     for (size_t t = 0; t < at->mesh->triangles; ++t) {
         ov_content content = {0.0, 0.0};
         if (at->zone[t] != OV_ZONE_CELL)
             continue;
         ov_survey_piece *const piece = &side->piece[at->piece_of[at->mesh->corners[3 * t]]];
-        if (s->options->vertices == OVOID_VERTEX_EXACT)
-            ov_mesh_smooth_triangle(at->mesh, t, s->options->about, &content);
-        else
-            ov_mesh_flat_triangle(at->mesh, t, s->options->about, &content);
+        (exact ? ov_mesh_smooth_triangle : ov_mesh_flat_triangle)(at->mesh, t, piece->at, &content);
+        (exact ? ov_mesh_smooth_vector : ov_mesh_flat_vector)(at->mesh, t, piece->vector);
         piece->area += content.area;
         piece->volume += content.volume;
     }
@@ -226,7 +230,6 @@ static ovoid_status record_vertex(ov_surveyor *s, const ov_sheet *from, size_t v
     double at[3];
     ov_mesh_at(from->mesh, v, at);
     side->piece[piece].furthest = fmax(side->piece[piece].furthest, distance);
-    memcpy(side->piece[piece].at, at, sizeof at);
     if (is_at_seam(s, at))
         OV_TRY(add_seam(s, at, piece, side));
     if (distance >= s->options->least)

@@ -29,9 +29,10 @@ typedef struct ov_survey_sums {
 
 /* A part of a surface that hangs together within a cell. */
 typedef struct ov_survey_piece {
-    double area, volume;         /* the volume between it and the point that volumes count from */
-    double furthest;             /* of its vertices from the other surface, angstrom */
+    double area, volume;         /* the volume between it and the vertex that follows */
     double at[3];                /* one of its vertices */
+    double vector[3];            /* its vector area, angstrom^2 */
+    double furthest;             /* of its vertices from the other surface, angstrom */
     ov_survey_sums whole, outer; /* to the other surface, and to its outer components alone */
     bool outer_supposed;         /* what was taken to be known of it, for `outer` */
 } ov_survey_piece;
@@ -82,7 +83,6 @@ typedef struct ov_survey_options {
     ovoid_vertex_rule vertices; /* linear: areas and volumes of flat triangles */
     double halo;     /* angstrom: so far about the cell the terms make the surfaces what they are,
                         and OV_SURVEY_ROOM steps more; 0: nothing is said of that */
-    double about[3]; /* volumes count from here */
     bool sums;       /* of distances, with a halo */
     bool contents;   /* nothing but areas, volumes and pieces */
     uint32_t cell;   /* its number, for what is far */

@@ -12,7 +12,8 @@ typedef struct joint {
     size_t pieces, seams;
     size_t *first;   /* of each cell */
     uint32_t *whole; /* of each piece: the first one that it hangs together with */
-    double *volume;  /* of each such */
+    double *volume;  /* of each such, */
+    double *at;      /* counted from a vertex of it */
     ov_survey_seam *seam;
 } joint;
 
@@ -20,6 +21,7 @@ static void joint_destroy(joint *j) {
     free(j->first);
     free(j->whole);
     free(j->volume);
+    free(j->at);
     free(j->seam);
 }
 
@@ -41,8 +43,16 @@ static ovoid_status joint_create(ovoid_context *context, const ov_survey_cell *c
     j->first = ov_alloc(context, count, sizeof *j->first, "pieces of a surface");
     j->whole = ov_alloc(context, j->pieces, sizeof *j->whole, "pieces of a surface");
     j->volume = ov_alloc(context, j->pieces, sizeof *j->volume, "pieces of a surface");
+    j->at = ov_alloc(context, j->pieces, 3 * sizeof *j->at, "pieces of a surface");
     j->seam = ov_alloc(context, j->seams, sizeof *j->seam, "seams between parts");
-    return j->first && j->whole && j->volume && j->seam ? OVOID_OK : OVOID_ERROR_MEMORY;
+    return j->first && j->whole && j->volume && j->at && j->seam ? OVOID_OK : OVOID_ERROR_MEMORY;
+}
+
+/* Adds what a piece has of a volume that counts from this place. */
+static void add_volume(const ov_survey_piece *piece, const double from[3], double *volume) {
+    *volume += piece->volume;
+    for (size_t k = 0; k < 3; ++k)
+        *volume += (piece->at[k] - from[k]) * piece->vector[k] / 3.0;
 }
 
 /* Pieces that have a vertex in common are parts of one. */
@@ -54,8 +64,10 @@ static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) 
         for (size_t k = 0; k < side->seams; ++k)
             j->seam[seam++] = (ov_survey_seam){.key = side->seam[k].key,
                                                .piece = (uint32_t)piece + side->seam[k].piece};
-        for (size_t k = 0; k < side->pieces; ++k, ++piece)
+        for (size_t k = 0; k < side->pieces; ++k, ++piece) {
             j->whole[piece] = (uint32_t)piece;
+            memcpy(j->at + 3 * piece, side->piece[k].at, sizeof side->piece[k].at);
+        }
     }
     qsort(j->seam, j->seams, sizeof *j->seam, by_key);
     for (size_t k = 1; k < j->seams; ++k)
@@ -64,7 +76,7 @@ static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) 
     for (size_t c = 0; c < count; ++c)
         for (size_t k = 0; k < cells[c].side[n].pieces; ++k) {
             const uint32_t whole = ov_union_first(j->whole, (uint32_t)(j->first[c] + k));
-            j->volume[whole] += cells[c].side[n].piece[k].volume;
+            add_volume(&cells[c].side[n].piece[k], j->at + 3 * (size_t)whole, &j->volume[whole]);
         }
 }
 
@@ -87,14 +99,14 @@ static void add_side(const ov_survey_cell *cells, size_t count, size_t n, joint 
             const size_t at = j->first[c] + k;
             const bool outer = is_outer(j, at), first = j->whole[at] == at;
             total->area[n] += piece->area;
-            total->volume[n] += piece->volume;
+            total->volume[n] += first ? j->volume[at] : 0.0;
             total->components[n] += first;
             total->hausdorff = fmax(total->hausdorff, piece->furthest);
             add_sums(&piece->whole, &total->sums[n]);
             if (!outer)
                 continue;
             total->area_outer[n] += piece->area;
-            total->volume_outer[n] += piece->volume;
+            total->volume_outer[n] += first ? j->volume[at] : 0.0;
             total->outer[n] += first;
             add_sums(&piece->outer, &total->sums_outer[n]);
             total->deviation = fmax(total->deviation, piece->furthest);

@@ -192,6 +192,16 @@ void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double
     content->volume += dot(a, normal) / 6.0;
 }
 
+void ov_mesh_flat_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]) {
+    double a[3], u[3], v[3], normal[3];
+    corners_at(mesh, triangle, a, u, v);
+    subtract(u, a, u);
+    subtract(v, a, v);
+    cross(u, v, normal);
+    for (size_t k = 0; k < 3; ++k)
+        vector[k] += 0.5 * normal[k];
+}
+
 /* Flat areas and volumes. Each component has its own origin, one of its vertices, so that little
  * cancels; where it is closed the origin does not matter. */
 static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh) {
@@ -522,6 +532,22 @@ void ov_mesh_smooth_triangle(const ovoid_mesh *mesh, size_t triangle, const doub
     bent_triangle bent;
     bend(mesh, triangle, origin, &bent);
     integrate_bent(&bent, content);
+}
+
+/* Bending adds the areas between the edges and their chords: over a chord e the curve encloses with
+ * it b x e / 6, where b is four times its height. */
+void ov_mesh_smooth_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]) {
+    const double zero[3] = {0.0, 0.0, 0.0};
+    bent_triangle bent;
+    ov_mesh_flat_vector(mesh, triangle, vector);
+    bend(mesh, triangle, zero, &bent);
+    for (size_t i = 0; i < 3; ++i) {
+        double edge[3], area[3];
+        subtract(bent.p[(i + 1) % 3], bent.p[i], edge);
+        cross(bent.b[i], edge, area);
+        for (size_t k = 0; k < 3; ++k)
+            vector[k] += area[k] / 6.0;
+    }
 }
 
 ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,

@@ -14,6 +14,8 @@
 /* Steps of the lattice are cut so fine to tell vertices apart: far above rounding, far below what
  * lies between two sheets. */
 #define FINE 256.0
+/* What rounding may lift a vertex by over a plane of the lattice, in its steps. */
+#define LEVEL 1e-4
 
 /* ---- the surfaces ---------------------------------------------------------------------------- */
 
@@ -107,10 +109,35 @@ cleanup:
 
 /* ---- what lies in the cell ------------------------------------------------------------------- */
 
+/* Whether all of a triangle lies in a plane across an axis, in steps of the lattice, but for
+ * rounding. */
+static bool is_level(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle, size_t axis,
+                     double plane) {
+    for (size_t i = 0; i < 3; ++i) {
+        double at[3];
+        ov_mesh_at(mesh, mesh->corners[3 * triangle + i], at);
+        if (fabs(at[axis] / s->options->spacing - plane) > LEVEL)
+            return false;
+    }
+    return true;
+}
+
+/* Where a triangle counts as being: at its centre or, where each has to be in one cell and no
+ * other, in the middle of its cube of the lattice, of which no rounding makes another one. */
+static void find_place(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle,
+                       double place[3]) {
+    ov_mesh_centre(mesh, triangle, place);
+    for (size_t k = 0; s->options->halo > 0.0 && k < 3; ++k) {
+        const double steps = place[k] / s->options->spacing, plane = round(steps);
+        const double first = is_level(s, mesh, triangle, k, plane) ? plane : floor(steps);
+        place[k] = (first + 0.5) * s->options->spacing;
+    }
+}
+
 static bool is_inside(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle) {
     double centre[3];
     bool inside = true;
-    ov_mesh_centre(mesh, triangle, centre);
+    find_place(s, mesh, triangle, centre);
     for (size_t k = 0; k < 3; ++k)
         inside = inside && centre[k] >= s->low[k] && centre[k] < s->high[k];
     return inside;

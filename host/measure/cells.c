@@ -306,17 +306,20 @@ static ovoid_status distances_of(job *j, const ov_survey_sums sums[OV_SURVEY_SID
     return OVOID_OK;
 }
 
+/* There are no images of it all. */
+static const ov_survey_images alone = {.count = 1};
+
 static ovoid_status find_distances(job *j, ovoid_measures *made) {
     ovoid_status status = OVOID_OK;
     ov_survey_total total = {0};
-    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, 0.0, &total));
+    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total));
     OV_TRY(check_outer(j, &total));
     ov_survey_total_destroy(&total);
     OV_TRY(ov_survey_stand(j->context, j->cell, j->cells, &j->standing));
     OV_TRY(correct_all(j));
     OV_TRY(settle(j, 0, j->cells));
     OV_TRY(settle_late(j));
-    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, 0.0, &total));
+    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total));
     OV_TRY(distances_of(j, total.sums, &made->distances));
     OV_TRY(distances_of(j, total.sums_outer, &made->distances_outer));
     made->deviation = total.deviation;
@@ -327,7 +330,7 @@ cleanup:
 
 static ovoid_status find_contents(job *j, ovoid_measures *made) {
     ov_survey_total total = {0};
-    const ovoid_status status = ov_survey_join(j->context, j->cell, j->cells, 0.0, &total);
+    const ovoid_status status = ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total);
     made->area = ov_pair_of(total.area[0], total.area[1]);
     made->volume = ov_pair_of(total.volume[0], total.volume[1]);
     made->area_outer = ov_pair_of(total.area_outer[0], total.area_outer[1]);

@@ -56,14 +56,14 @@ cleanup:
 ovoid_status ov_shelf_create(ovoid_context *context, const ovoid_field *field, size_t most,
                              double least, ov_shelf *shelf) {
     ovoid_status status = OVOID_OK;
-    ov_shelf made = {.field = field, .least = least};
+    ov_shelf made = {.field = field, .least = least, .cut = {.images = 1}};
     double *const centres = ov_alloc(context, 4 * field->count, sizeof *centres, "centres");
     if (!centres)
         return OVOID_ERROR_MEMORY;
     for (size_t i = 0; i < field->count; ++i)
         for (size_t k = 0; k < 3; ++k)
             centres[4 * i + k] = field->quadrics[i].centre[k];
-    OV_TRY(ov_partition_create(context, centres, field->count, most, 0.0, &made.cut));
+    OV_TRY(ov_partition_create(context, centres, field->count, most, &made.cut));
     OV_TRY(bound_parts(context, &made));
 cleanup:
     free(centres);

@@ -16,6 +16,12 @@
 #define FINE 256.0
 /* What rounding may lift a vertex by over a plane of the lattice, in its steps. */
 #define LEVEL 1e-4
+#define NO_IMAGE UINT32_MAX
+/* Terms this near to a place, angstrom, are asked which is the largest there: atoms' surfaces are
+ * within half of it. Where there are none, the nearest centre counts, within the second distance.
+ */
+#define LARGEST_WITHIN 4.0
+#define NEAREST_WITHIN 24.0
 
 /* ---- the surfaces ---------------------------------------------------------------------------- */
 
@@ -109,6 +115,37 @@ cleanup:
 
 /* ---- what lies in the cell ------------------------------------------------------------------- */
 
+/* The image whose term is the largest at a place. NO_IMAGE far from all: ellipsoids that are felt
+ * near the unit make surfaces where others, which are not, are missing. */
+static uint32_t image_at(const ov_surveyor *s, const double at[3]) {
+    uint32_t near[2 * OV_NEAR_MAX], largest = OV_NOBODY;
+    const size_t count = ov_grid_near(&s->largest, at, UINT32_MAX, near);
+    double most = -INFINITY;
+    for (size_t n = 0; n < count; ++n) {
+        const double value = ov_quadric_log_value(&s->original[near[n]].quadric, at);
+        if (value > most) {
+            most = value;
+            largest = near[n];
+        }
+    }
+    if (largest == OV_NOBODY)
+        largest =
+            ov_grid_nearest(&s->nearest, s->original->quadric.centre, sizeof *s->original, at);
+    return largest == OV_NOBODY ? NO_IMAGE : s->options->image[largest];
+}
+
+static ovoid_status tell_images_apart(ov_surveyor *s) {
+    ovoid_status status = OVOID_OK;
+    if (!s->options->image || s->original_count == 0)
+        return OVOID_OK;
+    OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
+                      s->original_count, LARGEST_WITHIN, &s->largest));
+    OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
+                      s->original_count, NEAREST_WITHIN, &s->nearest));
+cleanup:
+    return status;
+}
+
 /* Whether all of a triangle lies in a plane across an axis, in steps of the lattice, but for
  * rounding. */
 static bool is_level(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle, size_t axis,
@@ -140,7 +177,7 @@ static bool is_inside(const ov_surveyor *s, const ovoid_mesh *mesh, size_t trian
     find_place(s, mesh, triangle, centre);
     for (size_t k = 0; k < 3; ++k)
         inside = inside && centre[k] >= s->low[k] && centre[k] < s->high[k];
-    return inside;
+    return inside && (!s->options->image || image_at(s, centre) == 0);
 }
 
 /* Whether a triangle that is not in the cell is near enough for its place to be right: as far out
@@ -235,6 +272,49 @@ static ovoid_status add_seam(const ov_surveyor *s, const double at[3], uint32_t 
                              &side->seam_capacity);
 }
 
+static ovoid_status add_port(const ov_surveyor *s, const ovoid_mesh *mesh, size_t v, uint32_t piece,
+                             uint32_t image, ov_survey_side *side) {
+    const ovoid_status status = ov_grow(s->context, &side->port, &side->port_capacity,
+                                        side->ports + 1, sizeof *side->port, "seams between units");
+    if (status != OVOID_OK)
+        return status;
+    ov_survey_port *const port = &side->port[side->ports++];
+    *port = (ov_survey_port){.image = image, .piece = piece};
+    ov_mesh_at(mesh, v, port->at);
+    memcpy(port->normal, mesh->normals + 3 * v, sizeof port->normal);
+    return OVOID_OK;
+}
+
+/* Vertices of pieces that triangles of other images have, too, once for each such image. */
+static ovoid_status add_ports(const ov_surveyor *s, const ov_sheet *from, ov_survey_side *side) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_mesh *const mesh = from->mesh;
+    uint32_t *const last = ov_alloc(s->context, mesh->vertices, sizeof *last, "seams");
+    if (!last)
+        return OVOID_ERROR_MEMORY;
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        const uint32_t *const corner = mesh->corners + 3 * t;
+        double centre[3];
+        bool any = false;
+        for (size_t i = 0; i < 3; ++i)
+            any = any || from->piece_of[corner[i]] != OV_NO_PIECE;
+        if (from->zone[t] == OV_ZONE_CELL || !any)
+            continue;
+        ov_mesh_centre(mesh, t, centre);
+        const uint32_t image = image_at(s, centre);
+        for (size_t i = 0; i < 3 && image > 0 && image != NO_IMAGE; ++i) {
+            const uint32_t v = corner[i], piece = from->piece_of[v];
+            if (piece == OV_NO_PIECE || last[v] == image)
+                continue;
+            last[v] = image;
+            OV_TRY(add_port(s, mesh, v, piece, image, side));
+        }
+    }
+cleanup:
+    free(last);
+    return status;
+}
+
 static ovoid_status add_spot(const ov_surveyor *s, const double at[3], double distance,
                              uint32_t piece, ov_survey_side *side) {
     ovoid_status status = OVOID_OK;
@@ -282,6 +362,8 @@ static ovoid_status record_sheet(ov_surveyor *s, size_t n, ov_survey_cell *cell)
             OV_TRY(record_vertex(s, from, v, side));
     if (s->options->sums)
         OV_TRY(ov_spans_mark(s, n, side));
+    if (s->options->image)
+        OV_TRY(add_ports(s, from, side));
 cleanup:
     return status;
 }
@@ -308,6 +390,9 @@ static ovoid_status open_survey(ov_surveyor *s, const ov_survey_terms *terms) {
     const double began = ov_seconds();
     middle_of(terms->body[first], terms->count[first], s->origin);
     s->meter.watch = &s->watch;
+    s->original = terms->body[0];
+    s->original_count = terms->count[0];
+    OV_TRY(tell_images_apart(s));
     OV_TRY(ov_marcher_create(s->context, &s->marcher));
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         OV_TRY(mesh_sheet(s, terms->body[n], terms->count[n], &s->sheet[n]));
@@ -326,6 +411,8 @@ static void close_survey(ov_surveyor *s) {
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         sheet_destroy(&s->sheet[n]);
     ov_facets_destroy(&s->facets);
+    ov_grid_destroy(&s->largest);
+    ov_grid_destroy(&s->nearest);
     ov_meter_destroy(&s->meter);
     ov_marcher_destroy(&s->marcher);
 }
@@ -423,6 +510,7 @@ void ov_survey_cell_destroy(ov_survey_cell *cell) {
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         free(cell->side[n].piece);
         free(cell->side[n].seam);
+        free(cell->side[n].port);
         free(cell->side[n].spot);
         free(cell->side[n].spot_on);
         free(cell->side[n].mark);

@@ -14,6 +14,7 @@
 #ifndef OV_SURVEY_H
 #define OV_SURVEY_H
 
+#include "base/rigid.h"
 #include "measure/judge.h"
 #include "mesh/pieces.h"
 
@@ -43,17 +44,26 @@ typedef struct ov_survey_seam {
     uint32_t piece;
 } ov_survey_seam;
 
+/* A vertex where the unit of a symmetric assembly ends: an image of it goes on from there. */
+typedef struct ov_survey_port {
+    double at[3];
+    float normal[3];
+    uint32_t image, piece;
+} ov_survey_port;
+
 typedef struct ov_survey_side {
     ov_survey_piece *piece;
     ov_survey_seam *seam;
+    ov_survey_port *port;
     ov_spot *spot;         /* vertices that are far from the other surface */
     uint32_t *spot_on;     /* the piece of each */
     ov_survey_seam *mark;  /* a few of the vertices that are in other cells' surroundings */
     ov_survey_seam *asked; /* such vertices of others, by surfaces (`piece`) that are not in the
                               cell, and were supposed to be outer ones */
-    size_t pieces, seams, spots, marks, askings;
+    size_t pieces, seams, ports, spots, marks, askings;
     size_t missed; /* terms whose pieces could not be meshed, here and about */
-    size_t seam_capacity, spot_capacity, spot_on_capacity, mark_capacity, asked_capacity;
+    size_t seam_capacity, port_capacity, spot_capacity, spot_on_capacity, mark_capacity,
+        asked_capacity;
 } ov_survey_side;
 
 /* A point whose distance is not known in its cell. */
@@ -87,6 +97,12 @@ typedef struct ov_survey_options {
     bool contents;   /* nothing but areas, volumes and pieces */
     uint32_t cell;   /* its number, for what is far */
     double *meshing; /* gets the seconds that meshes take, too; NULL: nobody asks */
+    /* Where what is surveyed is the unit of a symmetric assembly: of which image of the unit each
+     * term of the original is, 0 of itself, and where the axes meet. A place of either surface
+     * belongs to the image of the original's largest term there, and what belongs to others than
+     * the unit itself is left to their own survey. NULL: all is surveyed. */
+    const uint32_t *image;
+    const double *centre;
 } ov_survey_options;
 
 /* Beyond the halo, in steps of the lattice. */
@@ -158,9 +174,20 @@ typedef struct ov_survey_total {
     size_t spots;
 } ov_survey_total;
 
-/* Joins all cells. Spots are no nearer to each other than `apart`. */
+/* Where a survey is of the unit of a symmetric assembly: the images that its cells speak of, first
+ * the unit itself, and the spacing of its meshes. */
+typedef struct ov_survey_images {
+    const ov_rigid *image;
+    size_t count; /* 1: there is the unit alone */
+    double spacing;
+    const double *centre; /* where the axes meet */
+} ov_survey_images;
+
+/* Joins all cells: of a unit, too, what hangs together with images of it. Contents are then those
+ * of the unit, and so are pieces: of what the images repeat one is counted. Spots are no nearer to
+ * each other than `apart`. */
 ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                            double apart, ov_survey_total *total);
+                            const ov_survey_images *images, double apart, ov_survey_total *total);
 void ov_survey_total_destroy(ov_survey_total *total);
 
 #endif

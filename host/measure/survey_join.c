@@ -2,19 +2,26 @@
 #include "measure/survey.h"
 
 #include "mesh/union.h"
+#include "neighbours/neighbours.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* In lattice steps: an image's vertices at the seam between a unit and its image lie this near to
+ * the unit's own, which are of another lattice, and look the same way to within this cosine. */
+#define PORT 2.0
+#define PORT_COSINE 0.7
+
 /* The pieces of one side, those of all cells one after the other. */
 typedef struct joint {
-    size_t pieces, seams;
+    size_t pieces, seams, ports;
     size_t *first;   /* of each cell */
     uint32_t *whole; /* of each piece: the first one that it hangs together with */
     double *volume;  /* of each such, */
     double *at;      /* counted from a vertex of it */
     ov_survey_seam *seam;
+    ov_survey_port *port;
 } joint;
 
 static void joint_destroy(joint *j) {
@@ -23,6 +30,7 @@ static void joint_destroy(joint *j) {
     free(j->volume);
     free(j->at);
     free(j->seam);
+    free(j->port);
 }
 
 static int by_key(const void *a, const void *b) {
@@ -37,6 +45,7 @@ static ovoid_status joint_create(ovoid_context *context, const ov_survey_cell *c
     for (size_t c = 0; c < count; ++c) {
         j->pieces += cells[c].side[n].pieces;
         j->seams += cells[c].side[n].seams;
+        j->ports += cells[c].side[n].ports;
     }
     if (j->pieces >= UINT32_MAX)
         return ov_fail(context, OVOID_ERROR_LIMIT, "a surface of %zu pieces", j->pieces);
@@ -45,7 +54,9 @@ static ovoid_status joint_create(ovoid_context *context, const ov_survey_cell *c
     j->volume = ov_alloc(context, j->pieces, sizeof *j->volume, "pieces of a surface");
     j->at = ov_alloc(context, j->pieces, 3 * sizeof *j->at, "pieces of a surface");
     j->seam = ov_alloc(context, j->seams, sizeof *j->seam, "seams between parts");
-    return j->first && j->whole && j->volume && j->at && j->seam ? OVOID_OK : OVOID_ERROR_MEMORY;
+    j->port = ov_alloc(context, j->ports, sizeof *j->port, "seams between units");
+    return j->first && j->whole && j->volume && j->at && j->seam && j->port ? OVOID_OK
+                                                                            : OVOID_ERROR_MEMORY;
 }
 
 /* Adds what a piece has of a volume that counts from this place. */
@@ -57,10 +68,14 @@ static void add_volume(const ov_survey_piece *piece, const double from[3], doubl
 
 /* Pieces that have a vertex in common are parts of one. */
 static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) {
-    size_t piece = 0, seam = 0;
+    size_t piece = 0, seam = 0, port = 0;
     for (size_t c = 0; c < count; ++c) {
         const ov_survey_side *const side = &cells[c].side[n];
         j->first[c] = piece;
+        for (size_t k = 0; k < side->ports; ++k, ++port) {
+            j->port[port] = side->port[k];
+            j->port[port].piece += (uint32_t)piece;
+        }
         for (size_t k = 0; k < side->seams; ++k)
             j->seam[seam++] = (ov_survey_seam){.key = side->seam[k].key,
                                                .piece = (uint32_t)piece + side->seam[k].piece};
@@ -73,10 +88,66 @@ static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) 
     for (size_t k = 1; k < j->seams; ++k)
         if (j->seam[k].key == j->seam[k - 1].key)
             ov_unite(j->whole, j->seam[k].piece, j->seam[k - 1].piece);
+}
+
+/* Of the vertices at seams the one that is what image the port leads to has where the port is: near
+ * there and facing the same way. NULL: there is none. */
+static const ov_survey_port *find_port(const joint *j, const ov_grid *grid,
+                                       const ov_survey_port *port, const ov_rigid *back) {
+    uint32_t near[2 * OV_NEAR_MAX];
+    const double normal[3] = {port->normal[0], port->normal[1], port->normal[2]};
+    double at[3], facing[3], least = INFINITY;
+    const ov_survey_port *nearest = NULL;
+    ov_rigid_move(back, port->at, at);
+    ov_rigid_turn(back, normal, facing);
+    const size_t count = ov_grid_near(grid, at, UINT32_MAX, near);
+    for (size_t n = 0; n < count; ++n) {
+        const ov_survey_port *const other = &j->port[near[n]];
+        double cosine = 0.0, square = 0.0;
+        for (size_t k = 0; k < 3; ++k) {
+            cosine += facing[k] * other->normal[k];
+            square += (at[k] - other->at[k]) * (at[k] - other->at[k]);
+        }
+        if (cosine >= PORT_COSINE && square < least) {
+            least = square;
+            nearest = other;
+        }
+    }
+    return nearest;
+}
+
+/* Pieces that go on in an image of the unit hang together with what the unit has there. */
+static ovoid_status join_images(ovoid_context *context, const ov_survey_images *images, joint *j) {
+    ovoid_status status = OVOID_OK;
+    ov_grid grid = {0};
+    ov_rigid *const back = ov_alloc(context, images->count, sizeof *back, "seams between units");
+    if (!back)
+        return OVOID_ERROR_MEMORY;
+    for (size_t g = 0; g < images->count; ++g)
+        back[g] = ov_rigid_inverse(&images->image[g]);
+    if (j->ports > 0)
+        OV_TRY(ov_grid_of(context, j->port->at, sizeof *j->port, j->ports, PORT * images->spacing,
+                          &grid));
+    for (size_t k = 0; k < j->ports; ++k) {
+        const ov_survey_port *const port = &j->port[k];
+        const ov_survey_port *const other = find_port(j, &grid, port, &back[port->image]);
+        if (other)
+            ov_unite(j->whole, port->piece, other->piece);
+    }
+cleanup:
+    ov_grid_destroy(&grid);
+    free(back);
+    return status;
+}
+
+/* centre: where volumes count from that images of the unit go on with; NULL: there are none. */
+static void add_volumes(const ov_survey_cell *cells, size_t count, size_t n, const double *centre,
+                        joint *j) {
     for (size_t c = 0; c < count; ++c)
         for (size_t k = 0; k < cells[c].side[n].pieces; ++k) {
             const uint32_t whole = ov_union_first(j->whole, (uint32_t)(j->first[c] + k));
-            add_volume(&cells[c].side[n].piece[k], j->at + 3 * (size_t)whole, &j->volume[whole]);
+            add_volume(&cells[c].side[n].piece[k], centre ? centre : j->at + 3 * (size_t)whole,
+                       &j->volume[whole]);
         }
 }
 
@@ -131,7 +202,7 @@ cleanup:
 }
 
 ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                            double apart, ov_survey_total *total) {
+                            const ov_survey_images *images, double apart, ov_survey_total *total) {
     ovoid_status status = OVOID_OK;
     ov_survey_total made = {0};
     size_t capacity = 0;
@@ -140,6 +211,10 @@ ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
         status = joint_create(context, cells, count, n, &j);
         if (status == OVOID_OK) {
             join(cells, count, n, &j);
+            status = images->count > 1 ? join_images(context, images, &j) : OVOID_OK;
+        }
+        if (status == OVOID_OK) {
+            add_volumes(cells, count, n, images->count > 1 ? images->centre : NULL, &j);
             add_side(cells, count, n, &j, &made);
             status = add_spots(context, cells, count, n, &j, &capacity, &made);
         }
@@ -193,6 +268,7 @@ ovoid_status ov_survey_stand(ovoid_context *context, const ov_survey_cell *cells
         status = joint_create(context, cells, count, n, &j);
         if (status == OVOID_OK) {
             join(cells, count, n, &j);
+            add_volumes(cells, count, n, NULL, &j);
             status = stand_side(context, cells, count, n, &j, &made);
         }
         joint_destroy(&j);

@@ -5,6 +5,7 @@
 #define OV_SURVEYOR_H
 
 #include "measure/survey.h"
+#include "neighbours/neighbours.h"
 
 #define OV_NO_PIECE UINT32_MAX
 
@@ -34,7 +35,10 @@ typedef struct ov_surveyor {
     const ov_survey_options *options;
     const double *low, *high;
     double origin[3];
-    ov_watch watch; /* leaves questions to the context, where the cells are counted */
+    const ov_body *original;
+    size_t original_count;
+    ov_grid largest, nearest; /* the original's terms, where images have to be told apart */
+    ov_watch watch;           /* leaves questions to the context, where the cells are counted */
     ov_marcher *marcher;
     ov_meter meter;
     ov_facets facets; /* of the triangles that count */

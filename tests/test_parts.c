@@ -2,7 +2,7 @@
  * Fits in parts (host/fit/parts): how a molecule is cut, surveys of cells beside measures of the
  * whole, models that hold across seams whatever number of workers, and checkpoints.
  */
-#include "fit/parts/partition.h"
+#include "measure/partition.h"
 #include "measure/survey.h"
 #include "model/factor.h"
 #include "support.h"

@@ -39,6 +39,17 @@ static const cli_number spacing_number = {"spacing",
                                           "Å",
                                           "of both meshes; areas and volumes of smooth surfaces "
                                           "depend on it by about 0.1 % at 0.5 Å"};
+static const cli_number cell_number = {"cell-atoms",
+                                       CLI_COUNT,
+                                       offsetof(ovoid_measure_options, cell_atoms),
+                                       0,
+                                       UINT32_MAX,
+                                       false,
+                                       false,
+                                       "",
+                                       "measures cell by cell, of at most so many atoms each, so "
+                                       "that memory follows a cell; 0: in cells of 16384 atoms "
+                                       "where there are more than 65536, else as a whole"};
 static const cli_number isovalue_number = {
     "isovalue", CLI_REAL, offsetof(measure_row, isovalue), 0, 1e6, true, false, "", ""};
 
@@ -69,6 +80,7 @@ void cli_measure_help(FILE *stream) {
           "                          model's)\n",
           stream);
     cli_number_help(&spacing_number, &defaults, stream);
+    cli_number_help(&cell_number, &defaults, stream);
     fprintf(
         stream,
         "  --vertices exact|linear\n"
@@ -151,13 +163,14 @@ static bool complete(int argc, char **argv, measure_job *job) {
 }
 
 static bool parse(int argc, char **argv, measure_job *job, int *code) {
-    enum { REPORT = 256, DEVICE, VERTICES, ISOVALUE, SPACING, PROFILE, QUIET, HELP };
+    enum { REPORT = 256, DEVICE, VERTICES, ISOVALUE, SPACING, CELLS, PROFILE, QUIET, HELP };
     static const struct option options[] = {{"report", required_argument, NULL, REPORT},
                                             {"device", required_argument, NULL, DEVICE},
                                             READING_OPTIONS,
                                             {"vertices", required_argument, NULL, VERTICES},
                                             {"isovalue", required_argument, NULL, ISOVALUE},
                                             {"spacing", required_argument, NULL, SPACING},
+                                            {"cell-atoms", required_argument, NULL, CELLS},
                                             {"profile", no_argument, NULL, PROFILE},
                                             {"quiet", no_argument, NULL, QUIET},
                                             {"help", no_argument, NULL, HELP},
@@ -188,6 +201,9 @@ static bool parse(int argc, char **argv, measure_job *job, int *code) {
             break;
         case SPACING:
             good = cli_number_parse(&spacing_number, optarg, &job->options);
+            break;
+        case CELLS:
+            good = cli_number_parse(&cell_number, optarg, &job->options);
             break;
         case PROFILE:
             job->profile.wanted = true;

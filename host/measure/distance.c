@@ -168,8 +168,9 @@ static ov_tree coarse_tree(const ov_tree *tree) {
 static ovoid_status measure_sites(ovoid_context *context, measuring *m, float *squared) {
     ovoid_status status = OVOID_OK;
     const size_t leaves = m->facets->leaves, chunk = m->facets->chunk;
-    if (leaves > chunk) {
+    if (leaves > chunk || m->use_bound)
         OV_TRY(ov_facets_boxes(context, m->facets));
+    if (leaves > chunk && !m->use_bound) {
         m->tree = coarse_tree(&m->facets->tree);
         OV_TRY(measure_leaves(context, m, true, 0, (leaves + OV_GROUP - 1) / OV_GROUP, squared));
         m->use_bound = true;
@@ -222,6 +223,18 @@ ovoid_status ov_facets_distances(ovoid_context *context, ov_meter *meter, ov_fac
     OV_TRY(prepare(context, &m));
     OV_TRY(measure_sites(context, &m, squared));
     OV_TRY(check_distances(context, squared, sites->count));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_facets_nearer(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                              const ov_sites *sites, float *squared) {
+    ovoid_status status = OVOID_OK;
+    measuring m = {.meter = meter, .facets = facets, .sites = sites, .use_bound = true};
+    if (sites->count == 0 || facets->trail.triangles == 0)
+        return OVOID_OK;
+    OV_TRY(prepare(context, &m));
+    OV_TRY(measure_sites(context, &m, squared));
 cleanup:
     return status;
 }

@@ -38,6 +38,11 @@ typedef struct ov_sites {
 ovoid_status ov_facets_distances(ovoid_context *context, ov_meter *meter, ov_facets *facets,
                                  const ov_sites *sites, float *squared);
 
+/* The same where squared holds what is known already: it becomes less where one of the facets is
+ * nearer. Most of them are not looked at, then. No triangle is no error. */
+ovoid_status ov_facets_nearer(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                              const ov_sites *sites, float *squared);
+
 /* distance[v] of each vertex of a mesh that is in a triangle of its trail, in angstrom; 0 for
  * others. */
 ovoid_status ov_trail_distances(ovoid_context *context, ov_meter *meter, ov_facets *facets,

@@ -2,8 +2,8 @@
 
 #include "base/progress.h"
 #include "base/sized.h"
+#include "measure/cells.h"
 #include "measure/distance.h"
-#include "model/fields.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -40,7 +40,7 @@ void ovoid_measures_init(ovoid_measures *measures, size_t size) {
     ov_sized_init(measures, size, &unknown, sizeof unknown);
 }
 
-static ovoid_pair pair_of(double original, double sparse) {
+ovoid_pair ov_pair_of(double original, double sparse) {
     const double difference = fabs(sparse - original);
     return (ovoid_pair){original, sparse, difference > 0.0 ? difference / fabs(original) : 0.0};
 }
@@ -59,8 +59,8 @@ static ovoid_status compare_contents(ovoid_context *context, const ovoid_mesh *o
     ov_content first, second;
     OV_TRY(ov_mesh_content(context, original, smooth, outer_only, &first));
     OV_TRY(ov_mesh_content(context, sparse, smooth, outer_only, &second));
-    *area = pair_of(first.area, second.area);
-    *volume = pair_of(first.volume, second.volume);
+    *area = ov_pair_of(first.area, second.area);
+    *volume = ov_pair_of(first.volume, second.volume);
 cleanup:
     return status;
 }
@@ -132,12 +132,55 @@ static ovoid_status name_failure(ovoid_context *context, ovoid_status status,
     return status;
 }
 
+static ovoid_status measure_whole(ovoid_context *context, ovoid_field *original,
+                                  ovoid_field *sparse, const ovoid_mesh_options *meshing,
+                                  bool distances, ovoid_measures *made) {
+    ovoid_status status = OVOID_OK;
+    ovoid_mesh *first = NULL, *second = NULL;
+    const double begin = ov_seconds();
+    status = ovoid_field_mesh(context, original, meshing, &first);
+    OV_TRY(name_failure(context, status, original, sparse, "first "));
+    status = ovoid_field_mesh(context, sparse, meshing, &second);
+    OV_TRY(name_failure(context, status, sparse, original, "second "));
+    const double meshed = ov_seconds();
+    ov_progress_stage(context, "measure");
+    OV_TRY(ov_measure_meshes(context, first, second, meshing->vertices == OVOID_VERTEX_EXACT,
+                             distances, made));
+    made->seconds_mesh = meshed - begin;
+cleanup:
+    ovoid_mesh_destroy(&first);
+    ovoid_mesh_destroy(&second);
+    return status;
+}
+
+/* How many atoms or ellipsoids a cell is to have; 0: both surfaces are measured as wholes. */
+static size_t cell_terms(const ovoid_measure_options *o, const ovoid_field *original,
+                         const ovoid_field *sparse) {
+    const size_t most = original->count > sparse->count ? original->count : sparse->count;
+    if (o->cell_atoms > 0)
+        return o->cell_atoms < most ? o->cell_atoms : 0;
+    return most > OVOID_DEFAULT_MEASURE_ATOMS ? OVOID_DEFAULT_CELL_ATOMS : 0;
+}
+
+static ovoid_status measure_cells(ovoid_context *context, ovoid_field *original,
+                                  ovoid_field *sparse, const ovoid_mesh_options *meshing,
+                                  const ovoid_measure_options *o, ovoid_measures *made) {
+    const ovoid_field *empty = NULL;
+    const ov_cells_options how = {.most = cell_terms(o, original, sparse),
+                                  .distances = o->distances};
+    const ovoid_status status =
+        ov_measure_cells(context, original, sparse, meshing, &how, &empty, made);
+    return !empty ? status
+                  : name_failure(context, status, empty, empty == original ? sparse : original,
+                                 empty == original ? "first " : "second ");
+}
+
 ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original, ovoid_field *sparse,
                            const ovoid_measure_options *options, ovoid_measures *measures) {
     ovoid_status status = OVOID_OK;
-    ovoid_mesh *first = NULL, *second = NULL;
     ovoid_measures made;
     ovoid_measure_options o;
+    ovoid_mesh_options meshing;
     OV_NEED(context, context);
     OV_NEED(context, original);
     OV_NEED(context, sparse);
@@ -149,22 +192,14 @@ ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original, ovoid_
     ovoid_measure_options_init(&o, sizeof o);
     OV_TRY(OV_SIZED_TAKE(context, ovoid_measure_options, options, &o));
     OV_TRY(ov_sized_check(context, "ovoid_measures", measures));
-    const double begin = ov_seconds();
-    const double isovalue = o.isovalue == 0.0 ? original->isovalue : o.isovalue;
-    const ovoid_mesh_options meshing = {sizeof meshing, isovalue, o.spacing, o.vertices};
-    status = ovoid_field_mesh(context, original, &meshing, &first);
-    OV_TRY(name_failure(context, status, original, sparse, "first "));
-    status = ovoid_field_mesh(context, sparse, &meshing, &second);
-    OV_TRY(name_failure(context, status, sparse, original, "second "));
-    const double meshed = ov_seconds();
-    ov_progress_stage(context, "measure");
-    OV_TRY(ov_measure_meshes(context, first, second, o.vertices == OVOID_VERTEX_EXACT, o.distances,
-                             &made));
-    made.seconds_mesh = meshed - begin;
+    const ovoid_mesh_options wanted = {sizeof wanted, o.isovalue, o.spacing, o.vertices};
+    OV_TRY(ov_mesh_options_take(context, &wanted, original, &meshing));
+    if (cell_terms(&o, original, sparse) > 0)
+        OV_TRY(measure_cells(context, original, sparse, &meshing, &o, &made));
+    else
+        OV_TRY(measure_whole(context, original, sparse, &meshing, o.distances, &made));
     ov_sized_give(measures, &made, sizeof made);
 cleanup:
-    ovoid_mesh_destroy(&first);
-    ovoid_mesh_destroy(&second);
     ov_progress_end(context);
     return status;
 }

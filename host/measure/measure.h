@@ -12,4 +12,7 @@ ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *origina
                                const ovoid_mesh *sparse, bool smooth, bool distances,
                                ovoid_measures *measures);
 
+/* The two and the error of the second. */
+ovoid_pair ov_pair_of(double original, double sparse);
+
 #endif

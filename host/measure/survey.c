@@ -1,9 +1,7 @@
-#include "measure/survey.h"
+#include "measure/surveyor.h"
 
 #include "base/progress.h"
 #include "mesh/union.h"
-#include "model/factor.h"
-#include "neighbours/neighbours.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,81 +14,78 @@
 /* Steps of the lattice are cut so fine to tell vertices apart: far above rounding, far below what
  * lies between two sheets. */
 #define FINE 256.0
-#define NO_PIECE UINT32_MAX
+/* What rounding may lift a vertex by over a plane of the lattice, in its steps. */
+#define LEVEL 1e-4
 #define NO_IMAGE UINT32_MAX
 /* Terms this near to a place, angstrom, are asked which is the largest there: atoms' surfaces are
  * within half of it. Where there are none, the nearest centre counts, within the second distance.
  */
 #define LARGEST_WITHIN 4.0
 #define NEAREST_WITHIN 24.0
-/* In lattice steps: an image's vertices at the seam between a unit and its image lie this near to
- * the unit's own, which are of another lattice, and look the same way to within this cosine. */
-#define PORT 2.0
-#define PORT_COSINE 0.7
 
-/* ---- one cell -------------------------------------------------------------------------------- */
+/* ---- the surfaces ---------------------------------------------------------------------------- */
 
-/* One of the surfaces in the cell at hand. */
-typedef struct sheet {
-    ovoid_mesh *mesh;   /* NULL: there is none */
-    float *distance;    /* of its vertices from the other one */
-    uint32_t *piece_of; /* of its vertices; NO_PIECE: of no triangle in the cell */
-    bool *inside;       /* of its triangles: whether they are in the cell */
-    ov_trail trail;
-    ov_facets facets;
-} sheet;
-
-static void sheet_destroy(sheet *s) {
+static void sheet_destroy(ov_sheet *s) {
     ov_trail_destroy(&s->trail);
     ov_facets_destroy(&s->facets);
     ovoid_mesh_destroy(&s->mesh);
+    free(s->zone);
     free(s->distance);
     free(s->piece_of);
-    free(s->inside);
+    free(s->group_of);
+    free(s->stands);
 }
 
-typedef struct surveyor {
-    ovoid_context *context;
-    const ov_survey_options *options;
-    const double *low, *high;
-    double origin[3];
-    const ov_quadric *original;
-    size_t original_count;
-    ov_grid largest, nearest; /* the original's terms, where images have to be told apart */
-    ov_marcher *marcher;
-    ov_meter meter;
-    sheet sheet[OV_SURVEY_SIDES];
-} surveyor;
-
-static ovoid_status mesh_sheet(surveyor *s, const ov_quadric *quadrics, size_t count, sheet *made) {
-    ovoid_status status = OVOID_OK;
+static ovoid_status make_mesh(ov_surveyor *s, const ov_body *bodies, size_t count, ov_sheet *made) {
+    const double reach = s->options->halo + OV_SURVEY_ROOM * s->options->spacing;
     ovoid_mesh_options meshing;
+    double low[3], high[3];
     ovoid_mesh_options_init(&meshing, sizeof meshing);
     meshing.isovalue = s->options->isovalue;
     meshing.spacing = s->options->spacing;
-    ov_body *bodies = NULL;
-    OV_TRY(ov_bodies_of_quadrics(s->context, quadrics, count, &bodies));
-    status = count == 0 ? OVOID_ERROR_EMPTY
-                        : ov_mesh_bodies_light(s->context, s->marcher, bodies, count, &meshing,
-                                               s->origin, NULL, true, &made->mesh);
-    free(bodies);
-    if (status != OVOID_OK)
-        return status == OVOID_ERROR_EMPTY ? OVOID_OK : status;
+    meshing.vertices = s->options->vertices;
+    for (size_t k = 0; k < 3; ++k) {
+        low[k] = s->low[k] - reach;
+        high[k] = s->high[k] + reach;
+    }
+    if (s->options->halo > 0.0)
+        ov_marcher_clip(s->marcher, low, high);
+    const ovoid_status status =
+        count == 0 ? OVOID_ERROR_EMPTY
+                   : ov_mesh_bodies_light(s->context, s->marcher, bodies, count, &meshing,
+                                          s->origin, &s->watch, true, &made->mesh);
+    return status == OVOID_ERROR_EMPTY ? OVOID_OK : status;
+}
+
+static ovoid_status mesh_sheet(ov_surveyor *s, const ov_body *bodies, size_t count,
+                               ov_sheet *made) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(make_mesh(s, bodies, count, made));
+    if (!made->mesh)
+        return OVOID_OK;
     OV_TRY(ov_mesh_finish(s->context, made->mesh));
+    made->zone = ov_alloc(s->context, made->mesh->triangles, sizeof *made->zone, "pieces");
     made->distance = ov_alloc(s->context, made->mesh->vertices, sizeof(float), "distances");
     made->piece_of = ov_alloc(s->context, made->mesh->vertices, sizeof(uint32_t), "pieces");
-    made->inside = ov_alloc(s->context, made->mesh->triangles, sizeof(bool), "pieces");
-    if (!made->distance || !made->piece_of || !made->inside) {
+    if (!made->zone || !made->distance || !made->piece_of)
         status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    OV_TRY(ov_trail_create(s->context, made->mesh, false, &made->trail));
-    OV_TRY(ov_facets_set(s->context, &made->facets, &made->trail, s->origin));
 cleanup:
     return status;
 }
 
-static ovoid_status measure_sheet(surveyor *s, sheet *from, sheet *to) {
+/* ---- distances of vertices, where sums are not wanted ---------------------------------------- */
+
+static ovoid_status lay_facets(ov_surveyor *s, ov_sheet *at) {
+    ovoid_status status = OVOID_OK;
+    if (!at->mesh)
+        return OVOID_OK;
+    OV_TRY(ov_trail_create(s->context, at->mesh, false, &at->trail));
+    OV_TRY(ov_facets_set(s->context, &at->facets, &at->trail, s->origin));
+cleanup:
+    return status;
+}
+
+static ovoid_status measure_sheet(ov_surveyor *s, ov_sheet *from, ov_sheet *to) {
     if (!from->mesh)
         return OVOID_OK;
     if (!to->mesh) {
@@ -108,85 +103,146 @@ static ovoid_status measure_sheet(surveyor *s, sheet *from, sheet *to) {
     return ov_vertex_distances_end(s->context, &s->meter, &from->facets, from->distance);
 }
 
+static ovoid_status measure_vertices(ov_surveyor *s) {
+    ovoid_status status = OVOID_OK;
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
+        OV_TRY(lay_facets(s, &s->sheet[n]));
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
+        OV_TRY(measure_sheet(s, &s->sheet[n], &s->sheet[1 - n]));
+cleanup:
+    return status;
+}
+
+/* ---- what lies in the cell ------------------------------------------------------------------- */
+
 /* The image whose term is the largest at a place. NO_IMAGE far from all: ellipsoids that are felt
  * near the unit make surfaces where others, which are not, are missing. */
-static uint32_t image_at(const surveyor *s, const double at[3]) {
+static uint32_t image_at(const ov_surveyor *s, const double at[3]) {
     uint32_t near[2 * OV_NEAR_MAX], largest = OV_NOBODY;
     const size_t count = ov_grid_near(&s->largest, at, UINT32_MAX, near);
     double most = -INFINITY;
     for (size_t n = 0; n < count; ++n) {
-        const double value = ov_quadric_log_value(&s->original[near[n]], at);
+        const double value = ov_quadric_log_value(&s->original[near[n]].quadric, at);
         if (value > most) {
             most = value;
             largest = near[n];
         }
     }
     if (largest == OV_NOBODY)
-        largest = ov_grid_nearest(&s->nearest, s->original->centre, sizeof *s->original, at);
+        largest =
+            ov_grid_nearest(&s->nearest, s->original->quadric.centre, sizeof *s->original, at);
     return largest == OV_NOBODY ? NO_IMAGE : s->options->image[largest];
 }
 
-static ovoid_status tell_images_apart(surveyor *s) {
+static ovoid_status tell_images_apart(ov_surveyor *s) {
     ovoid_status status = OVOID_OK;
     if (!s->options->image || s->original_count == 0)
         return OVOID_OK;
-    OV_TRY(ov_grid_of(s->context, s->original->centre, sizeof *s->original, s->original_count,
-                      LARGEST_WITHIN, &s->largest));
-    OV_TRY(ov_grid_of(s->context, s->original->centre, sizeof *s->original, s->original_count,
-                      NEAREST_WITHIN, &s->nearest));
+    OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
+                      s->original_count, LARGEST_WITHIN, &s->largest));
+    OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
+                      s->original_count, NEAREST_WITHIN, &s->nearest));
 cleanup:
     return status;
 }
 
-static bool is_inside(const surveyor *s, const ovoid_mesh *mesh, size_t triangle) {
+/* Whether all of a triangle lies in a plane across an axis, in steps of the lattice, but for
+ * rounding. */
+static bool is_level(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle, size_t axis,
+                     double plane) {
+    for (size_t i = 0; i < 3; ++i) {
+        double at[3];
+        ov_mesh_at(mesh, mesh->corners[3 * triangle + i], at);
+        if (fabs(at[axis] / s->options->spacing - plane) > LEVEL)
+            return false;
+    }
+    return true;
+}
+
+/* Where a triangle counts as being: at its centre or, where each has to be in one cell and no
+ * other, in the middle of its cube of the lattice, of which no rounding makes another one. */
+static void find_place(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle,
+                       double place[3]) {
+    ov_mesh_centre(mesh, triangle, place);
+    for (size_t k = 0; s->options->halo > 0.0 && k < 3; ++k) {
+        const double steps = place[k] / s->options->spacing, plane = round(steps);
+        const double first = is_level(s, mesh, triangle, k, plane) ? plane : floor(steps);
+        place[k] = (first + 0.5) * s->options->spacing;
+    }
+}
+
+static bool is_inside(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle) {
     double centre[3];
     bool inside = true;
-    ov_mesh_centre(mesh, triangle, centre);
+    find_place(s, mesh, triangle, centre);
     for (size_t k = 0; k < 3; ++k)
         inside = inside && centre[k] >= s->low[k] && centre[k] < s->high[k];
     return inside && (!s->options->image || image_at(s, centre) == 0);
 }
 
+/* Whether a triangle that is not in the cell is near enough for its place to be right: as far out
+ * as one reaches that has a point in the halo. */
+static bool is_near(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle) {
+    const double reach = s->options->halo + s->options->spacing;
+    double centre[3];
+    ov_mesh_centre(mesh, triangle, centre);
+    for (size_t k = 0; k < 3; ++k)
+        if (centre[k] < s->low[k] - reach || centre[k] > s->high[k] + reach)
+            return false;
+    return s->options->halo > 0.0;
+}
+
+static void find_zones(const ov_surveyor *s, ov_sheet *at) {
+    for (size_t t = 0; t < at->mesh->triangles; ++t)
+        at->zone[t] = is_inside(s, at->mesh, t) ? OV_ZONE_CELL
+                      : is_near(s, at->mesh, t) ? OV_ZONE_HALO
+                                                : OV_ZONE_BEYOND;
+}
+
 /* What hangs together by the triangles in the cell: what does so beyond it only may be an artefact
- * of where its surroundings end. Numbers the pieces, and returns how many there are. */
-static size_t find_pieces(const surveyor *s, sheet *at) {
+ * of where its surroundings end. Numbers the pieces. */
+static void find_pieces(ov_sheet *at) {
     const ovoid_mesh *const mesh = at->mesh;
     uint32_t *const of = at->piece_of;
     size_t count = 0;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        of[v] = NO_PIECE;
+        of[v] = OV_NO_PIECE;
     for (size_t t = 0; t < mesh->triangles; ++t) {
         const uint32_t *const corner = mesh->corners + 3 * t;
-        at->inside[t] = is_inside(s, mesh, t);
-        if (!at->inside[t])
+        if (at->zone[t] != OV_ZONE_CELL)
             continue;
         for (size_t i = 0; i < 3; ++i)
-            if (of[corner[i]] == NO_PIECE)
+            if (of[corner[i]] == OV_NO_PIECE)
                 of[corner[i]] = corner[i];
         ov_unite(of, corner[0], corner[1]);
         ov_unite(of, corner[0], corner[2]);
     }
     for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
-        if (of[v] != NO_PIECE)
+        if (of[v] != OV_NO_PIECE)
             of[v] = of[v] == v ? (uint32_t)count++ : of[of[v]];
-    return count;
+    at->pieces = count;
 }
 
-static void add_contents(const surveyor *s, const sheet *at, ov_survey_side *side) {
-    static const double zero[3] = {0.0, 0.0, 0.0};
-    const double *const centre = s->options->image ? s->options->centre : zero;
+/* Each piece has a place of its own that its volume counts from: what rounding leaves open between
+ * cells is little beside a cavity then, however far from everything's middle it is. */
+static void add_contents(const ov_surveyor *s, const ov_sheet *at, ov_survey_side *side) {
+    const bool exact = s->options->vertices == OVOID_VERTEX_EXACT;
+    for (size_t v = 0; v < at->mesh->vertices; ++v)
+        if (at->piece_of[v] != OV_NO_PIECE)
+            ov_mesh_at(at->mesh, v, side->piece[at->piece_of[v]].at);
     for (size_t t = 0; t < at->mesh->triangles; ++t) {
         ov_content content = {0.0, 0.0};
-        if (!at->inside[t])
+        if (at->zone[t] != OV_ZONE_CELL)
             continue;
         ov_survey_piece *const piece = &side->piece[at->piece_of[at->mesh->corners[3 * t]]];
-        ov_mesh_smooth_triangle(at->mesh, t, centre, &content);
+        (exact ? ov_mesh_smooth_triangle : ov_mesh_flat_triangle)(at->mesh, t, piece->at, &content);
+        (exact ? ov_mesh_smooth_vector : ov_mesh_flat_vector)(at->mesh, t, piece->vector);
         piece->area += content.area;
         piece->volume += content.volume;
     }
 }
 
-static bool is_at_seam(const surveyor *s, const double at[3]) {
+static bool is_at_seam(const ov_surveyor *s, const double at[3]) {
     const double reach = SEAM * s->options->spacing;
     for (size_t k = 0; k < 3; ++k)
         if (fabs(at[k] - s->low[k]) <= reach || fabs(at[k] - s->high[k]) <= reach)
@@ -194,23 +250,29 @@ static bool is_at_seam(const surveyor *s, const double at[3]) {
     return false;
 }
 
-static uint64_t key_of(const surveyor *s, const double at[3]) {
+uint64_t ov_survey_key(const ov_surveyor *s, const double at[3]) {
     int64_t fine[3];
     for (size_t k = 0; k < 3; ++k)
         fine[k] = llround(at[k] / s->options->spacing * FINE);
     return ov_hash(fine, sizeof fine);
 }
 
-static ovoid_status add_seam(const surveyor *s, const double at[3], uint32_t piece,
-                             ov_survey_side *side) {
-    const ovoid_status status = ov_grow(s->context, &side->seam, &side->seam_capacity,
-                                        side->seams + 1, sizeof *side->seam, "seams between parts");
+ovoid_status ov_survey_add_key(ovoid_context *context, uint64_t key, uint32_t piece,
+                               ov_survey_seam **list, size_t *count, size_t *capacity) {
+    const ovoid_status status =
+        ov_grow(context, list, capacity, *count + 1, sizeof **list, "seams between parts");
     if (status == OVOID_OK)
-        side->seam[side->seams++] = (ov_survey_seam){.key = key_of(s, at), .piece = piece};
+        (*list)[(*count)++] = (ov_survey_seam){.key = key, .piece = piece};
     return status;
 }
 
-static ovoid_status add_port(const surveyor *s, const ovoid_mesh *mesh, size_t v, uint32_t piece,
+static ovoid_status add_seam(const ov_surveyor *s, const double at[3], uint32_t piece,
+                             ov_survey_side *side) {
+    return ov_survey_add_key(s->context, ov_survey_key(s, at), piece, &side->seam, &side->seams,
+                             &side->seam_capacity);
+}
+
+static ovoid_status add_port(const ov_surveyor *s, const ovoid_mesh *mesh, size_t v, uint32_t piece,
                              uint32_t image, ov_survey_side *side) {
     const ovoid_status status = ov_grow(s->context, &side->port, &side->port_capacity,
                                         side->ports + 1, sizeof *side->port, "seams between units");
@@ -224,7 +286,7 @@ static ovoid_status add_port(const surveyor *s, const ovoid_mesh *mesh, size_t v
 }
 
 /* Vertices of pieces that triangles of other images have, too, once for each such image. */
-static ovoid_status add_ports(const surveyor *s, const sheet *from, ov_survey_side *side) {
+static ovoid_status add_ports(const ov_surveyor *s, const ov_sheet *from, ov_survey_side *side) {
     ovoid_status status = OVOID_OK;
     const ovoid_mesh *const mesh = from->mesh;
     uint32_t *const last = ov_alloc(s->context, mesh->vertices, sizeof *last, "seams");
@@ -235,14 +297,14 @@ static ovoid_status add_ports(const surveyor *s, const sheet *from, ov_survey_si
         double centre[3];
         bool any = false;
         for (size_t i = 0; i < 3; ++i)
-            any = any || from->piece_of[corner[i]] != NO_PIECE;
-        if (from->inside[t] || !any)
+            any = any || from->piece_of[corner[i]] != OV_NO_PIECE;
+        if (from->zone[t] == OV_ZONE_CELL || !any)
             continue;
         ov_mesh_centre(mesh, t, centre);
         const uint32_t image = image_at(s, centre);
         for (size_t i = 0; i < 3 && image > 0 && image != NO_IMAGE; ++i) {
             const uint32_t v = corner[i], piece = from->piece_of[v];
-            if (piece == NO_PIECE || last[v] == image)
+            if (piece == OV_NO_PIECE || last[v] == image)
                 continue;
             last[v] = image;
             OV_TRY(add_port(s, mesh, v, piece, image, side));
@@ -253,8 +315,8 @@ cleanup:
     return status;
 }
 
-static ovoid_status add_spot(const surveyor *s, const double at[3], double distance, uint32_t piece,
-                             ov_survey_side *side) {
+static ovoid_status add_spot(const ov_surveyor *s, const double at[3], double distance,
+                             uint32_t piece, ov_survey_side *side) {
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_grow(s->context, &side->spot, &side->spot_capacity, side->spots + 1,
                    sizeof *side->spot, "spots"));
@@ -266,43 +328,115 @@ cleanup:
     return status;
 }
 
-static ovoid_status record_sheet(surveyor *s, sheet *from, ov_survey_side *side) {
+/* A vertex of a piece, wherever it is. */
+static ovoid_status record_vertex(ov_surveyor *s, const ov_sheet *from, size_t v,
+                                  ov_survey_side *side) {
     ovoid_status status = OVOID_OK;
+    const uint32_t piece = from->piece_of[v];
+    const double distance = from->distance[v]; /* zeros unless it was measured */
+    double at[3];
+    ov_mesh_at(from->mesh, v, at);
+    side->piece[piece].furthest = fmax(side->piece[piece].furthest, distance);
+    if (is_at_seam(s, at))
+        OV_TRY(add_seam(s, at, piece, side));
+    if (distance >= s->options->least)
+        OV_TRY(add_spot(s, at, distance, piece, side));
+cleanup:
+    return status;
+}
+
+static ovoid_status record_sheet(ov_surveyor *s, size_t n, ov_survey_cell *cell) {
+    ovoid_status status = OVOID_OK;
+    const ov_sheet *const from = &s->sheet[n];
+    ov_survey_side *const side = &cell->side[n];
     if (!from->mesh)
         return OVOID_OK;
-    side->pieces = find_pieces(s, from);
+    side->missed = from->mesh->missed;
+    side->pieces = from->pieces;
     side->piece = ov_alloc(s->context, side->pieces, sizeof *side->piece, "pieces of a surface");
     if (!side->piece)
         return OVOID_ERROR_MEMORY;
     add_contents(s, from, side);
-    for (size_t v = 0; v < from->mesh->vertices; ++v) {
-        const uint32_t piece = from->piece_of[v];
-        double at[3];
-        if (piece == NO_PIECE)
-            continue;
-        ov_mesh_at(from->mesh, v, at);
-        side->piece[piece].furthest = fmax(side->piece[piece].furthest, from->distance[v]);
-        if (is_at_seam(s, at))
-            OV_TRY(add_seam(s, at, piece, side));
-        if (from->distance[v] >= s->options->least)
-            OV_TRY(add_spot(s, at, from->distance[v], piece, side));
-    }
+    for (size_t v = 0; v < from->mesh->vertices; ++v)
+        if (from->piece_of[v] != OV_NO_PIECE)
+            OV_TRY(record_vertex(s, from, v, side));
+    if (s->options->sums)
+        OV_TRY(ov_spans_mark(s, n, side));
     if (s->options->image)
         OV_TRY(add_ports(s, from, side));
 cleanup:
     return status;
 }
 
+/* ---- surveying ------------------------------------------------------------------------------- */
+
 /* The middle of some terms, which offsets are counted from. */
-static void middle_of(const ov_quadric *quadrics, size_t count, double origin[3]) {
+static void middle_of(const ov_body *bodies, size_t count, double origin[3]) {
     for (size_t k = 0; k < 3; ++k) {
         double low = INFINITY, high = -INFINITY;
         for (size_t i = 0; i < count; ++i) {
-            low = fmin(low, quadrics[i].centre[k]);
-            high = fmax(high, quadrics[i].centre[k]);
+            low = fmin(low, bodies[i].quadric.centre[k]);
+            high = fmax(high, bodies[i].quadric.centre[k]);
         }
         origin[k] = count > 0 ? 0.5 * low + 0.5 * high : 0.0;
     }
+}
+
+/* Meshes both surfaces and finds their pieces. The surveyor is to be closed, after a failure too.
+ */
+static ovoid_status open_survey(ov_surveyor *s, const ov_survey_terms *terms) {
+    ovoid_status status = OVOID_OK;
+    const size_t first = terms->count[0] > 0 ? 0 : 1;
+    const double began = ov_seconds();
+    middle_of(terms->body[first], terms->count[first], s->origin);
+    s->meter.watch = &s->watch;
+    s->original = terms->body[0];
+    s->original_count = terms->count[0];
+    OV_TRY(tell_images_apart(s));
+    OV_TRY(ov_marcher_create(s->context, &s->marcher));
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+        OV_TRY(mesh_sheet(s, terms->body[n], terms->count[n], &s->sheet[n]));
+        if (!s->sheet[n].mesh)
+            continue;
+        find_zones(s, &s->sheet[n]);
+        find_pieces(&s->sheet[n]);
+    }
+    if (s->options->meshing)
+        *s->options->meshing += ov_seconds() - began;
+cleanup:
+    return status;
+}
+
+static void close_survey(ov_surveyor *s) {
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
+        sheet_destroy(&s->sheet[n]);
+    ov_facets_destroy(&s->facets);
+    ov_grid_destroy(&s->largest);
+    ov_grid_destroy(&s->nearest);
+    ov_meter_destroy(&s->meter);
+    ov_marcher_destroy(&s->marcher);
+}
+
+ovoid_status ov_survey_bodies(ovoid_context *context, const ov_survey_options *options,
+                              const ov_survey_terms *terms, const double low[3],
+                              const double high[3], ov_survey_cell *cell) {
+    ovoid_status status = OVOID_OK;
+    ov_survey_cell made = {0};
+    ov_surveyor s = {.context = context, .options = options, .low = low, .high = high};
+    OV_TRY(open_survey(&s, terms));
+    if (!options->sums && !options->contents)
+        OV_TRY(measure_vertices(&s));
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
+        OV_TRY(record_sheet(&s, n, &made));
+    if (options->sums)
+        OV_TRY(ov_spans_add(&s, true, NULL, &made));
+cleanup:
+    close_survey(&s);
+    if (status == OVOID_OK)
+        *cell = made;
+    else
+        ov_survey_cell_destroy(&made);
+    return status;
 }
 
 ovoid_status ov_survey(ovoid_context *context, const ov_survey_options *options,
@@ -310,33 +444,65 @@ ovoid_status ov_survey(ovoid_context *context, const ov_survey_options *options,
                        size_t model_count, const double low[3], const double high[3],
                        ov_survey_cell *cell) {
     ovoid_status status = OVOID_OK;
-    ov_survey_cell made = {0};
-    surveyor s = {.context = context,
-                  .options = options,
-                  .low = low,
-                  .high = high,
-                  .original = original,
-                  .original_count = original_count};
-    middle_of(original, original_count, s.origin);
-    OV_TRY(tell_images_apart(&s));
-    OV_TRY(ov_marcher_create(context, &s.marcher));
-    OV_TRY(mesh_sheet(&s, original, original_count, &s.sheet[0]));
-    OV_TRY(mesh_sheet(&s, model, model_count, &s.sheet[1]));
-    OV_TRY(measure_sheet(&s, &s.sheet[0], &s.sheet[1]));
-    OV_TRY(measure_sheet(&s, &s.sheet[1], &s.sheet[0]));
-    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
-        OV_TRY(record_sheet(&s, &s.sheet[n], &made.side[n]));
+    ov_body *body[OV_SURVEY_SIDES] = {NULL, NULL};
+    OV_TRY(ov_bodies_of_quadrics(context, original, original_count, &body[0]));
+    OV_TRY(ov_bodies_of_quadrics(context, model, model_count, &body[1]));
+    const ov_survey_terms terms = {{body[0], body[1]}, {original_count, model_count}};
+    OV_TRY(ov_survey_bodies(context, options, &terms, low, high, cell));
 cleanup:
+    free(body[0]);
+    free(body[1]);
+    return status;
+}
+
+/* ---- once more ------------------------------------------------------------------------------- */
+
+/* The pieces are those that the cell had; all that is known of outer surfaces is forgotten. */
+static ovoid_status forget_outer(const ov_surveyor *s, ov_survey_cell *cell) {
+    size_t kept = 0;
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+        ov_survey_side *const side = &cell->side[n];
+        if (side->pieces != s->sheet[n].pieces)
+            return ov_fail(s->context, OVOID_ERROR_NUMERIC,
+                           "the device made another mesh of a surface than before");
+        for (size_t p = 0; p < side->pieces; ++p)
+            side->piece[p].outer = (ov_survey_sums){0};
+    }
+    for (size_t k = 0; k < cell->fars; ++k)
+        if (!cell->far[k].outer)
+            cell->far[kept++] = cell->far[k];
+    cell->fars = kept;
+    return OVOID_OK;
+}
+
+ovoid_status ov_survey_again(ovoid_context *context, const ov_survey_options *options,
+                             const ov_survey_terms *terms, const double low[3],
+                             const double high[3], const ov_survey_standing *standing,
+                             ov_survey_cell *cell) {
+    ovoid_status status = OVOID_OK;
+    ov_surveyor s = {.context = context, .options = options, .low = low, .high = high};
+    OV_TRY(open_survey(&s, terms));
+    OV_TRY(forget_outer(&s, cell));
+    OV_TRY(ov_spans_add(&s, false, standing, cell));
+cleanup:
+    close_survey(&s);
+    return status;
+}
+
+ovoid_status ov_survey_seek(ovoid_context *context, const ov_survey_options *options,
+                            const ov_survey_terms *terms, const double low[3], const double high[3],
+                            const ov_survey_standing *standing, const ov_survey_cell *cell,
+                            ov_survey_far *const *far, size_t count) {
+    ovoid_status status = OVOID_OK;
+    ov_surveyor s = {.context = context, .options = options, .low = low, .high = high};
+    OV_TRY(open_survey(&s, terms));
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
-        sheet_destroy(&s.sheet[n]);
-    ov_grid_destroy(&s.largest);
-    ov_grid_destroy(&s.nearest);
-    ov_meter_destroy(&s.meter);
-    ov_marcher_destroy(&s.marcher);
-    if (status == OVOID_OK)
-        *cell = made;
-    else
-        ov_survey_cell_destroy(&made);
+        if (cell->side[n].pieces != s.sheet[n].pieces)
+            OV_TRY(ov_fail(context, OVOID_ERROR_NUMERIC,
+                           "the device made another mesh of a surface than before"));
+    OV_TRY(ov_spans_seek(&s, standing, far, count));
+cleanup:
+    close_survey(&s);
     return status;
 }
 
@@ -347,204 +513,9 @@ void ov_survey_cell_destroy(ov_survey_cell *cell) {
         free(cell->side[n].port);
         free(cell->side[n].spot);
         free(cell->side[n].spot_on);
+        free(cell->side[n].mark);
+        free(cell->side[n].asked);
     }
+    free(cell->far);
     *cell = (ov_survey_cell){0};
-}
-
-/* ---- all cells ------------------------------------------------------------------------------- */
-
-/* The pieces of one side, those of all cells one after the other. */
-typedef struct joint {
-    size_t pieces, seams, ports;
-    size_t *first;   /* of each cell */
-    uint32_t *whole; /* of each piece: the first one that it hangs together with */
-    double *volume;  /* of each such */
-    ov_survey_seam *seam;
-    ov_survey_port *port;
-} joint;
-
-static void joint_destroy(joint *j) {
-    free(j->first);
-    free(j->whole);
-    free(j->volume);
-    free(j->seam);
-    free(j->port);
-}
-
-static int by_key(const void *a, const void *b) {
-    const ov_survey_seam *const p = a, *const q = b;
-    if (p->key != q->key)
-        return p->key < q->key ? -1 : 1;
-    return (p->piece > q->piece) - (p->piece < q->piece);
-}
-
-static ovoid_status joint_create(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                                 size_t n, joint *j) {
-    for (size_t c = 0; c < count; ++c) {
-        j->pieces += cells[c].side[n].pieces;
-        j->seams += cells[c].side[n].seams;
-        j->ports += cells[c].side[n].ports;
-    }
-    if (j->pieces >= UINT32_MAX)
-        return ov_fail(context, OVOID_ERROR_LIMIT, "a surface of %zu pieces", j->pieces);
-    j->first = ov_alloc(context, count, sizeof *j->first, "pieces of a surface");
-    j->whole = ov_alloc(context, j->pieces, sizeof *j->whole, "pieces of a surface");
-    j->volume = ov_alloc(context, j->pieces, sizeof *j->volume, "pieces of a surface");
-    j->seam = ov_alloc(context, j->seams, sizeof *j->seam, "seams between parts");
-    j->port = ov_alloc(context, j->ports, sizeof *j->port, "seams between units");
-    return j->first && j->whole && j->volume && j->seam && j->port ? OVOID_OK : OVOID_ERROR_MEMORY;
-}
-
-/* Pieces that have a vertex in common are parts of one. */
-static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) {
-    size_t piece = 0, seam = 0, port = 0;
-    for (size_t c = 0; c < count; ++c) {
-        const ov_survey_side *const side = &cells[c].side[n];
-        j->first[c] = piece;
-        for (size_t k = 0; k < side->ports; ++k, ++port) {
-            j->port[port] = side->port[k];
-            j->port[port].piece += (uint32_t)piece;
-        }
-        for (size_t k = 0; k < side->seams; ++k)
-            j->seam[seam++] = (ov_survey_seam){.key = side->seam[k].key,
-                                               .piece = (uint32_t)piece + side->seam[k].piece};
-        for (size_t k = 0; k < side->pieces; ++k, ++piece)
-            j->whole[piece] = (uint32_t)piece;
-    }
-    qsort(j->seam, j->seams, sizeof *j->seam, by_key);
-    for (size_t k = 1; k < j->seams; ++k)
-        if (j->seam[k].key == j->seam[k - 1].key)
-            ov_unite(j->whole, j->seam[k].piece, j->seam[k - 1].piece);
-}
-
-/* Of the vertices at seams the one that is what image the port leads to has where the port is: near
- * there and facing the same way. NULL: there is none. */
-static const ov_survey_port *find_port(const joint *j, const ov_grid *grid,
-                                       const ov_survey_port *port, const ov_rigid *back) {
-    uint32_t near[2 * OV_NEAR_MAX];
-    const double normal[3] = {port->normal[0], port->normal[1], port->normal[2]};
-    double at[3], facing[3], least = INFINITY;
-    const ov_survey_port *nearest = NULL;
-    ov_rigid_move(back, port->at, at);
-    ov_rigid_turn(back, normal, facing);
-    const size_t count = ov_grid_near(grid, at, UINT32_MAX, near);
-    for (size_t n = 0; n < count; ++n) {
-        const ov_survey_port *const other = &j->port[near[n]];
-        double cosine = 0.0, square = 0.0;
-        for (size_t k = 0; k < 3; ++k) {
-            cosine += facing[k] * other->normal[k];
-            square += (at[k] - other->at[k]) * (at[k] - other->at[k]);
-        }
-        if (cosine >= PORT_COSINE && square < least) {
-            least = square;
-            nearest = other;
-        }
-    }
-    return nearest;
-}
-
-/* Pieces that go on in an image of the unit hang together with what the unit has there. */
-static ovoid_status join_images(ovoid_context *context, const ov_survey_images *images, joint *j) {
-    ovoid_status status = OVOID_OK;
-    ov_grid grid = {0};
-    ov_rigid *const back = ov_alloc(context, images->count, sizeof *back, "seams between units");
-    if (!back)
-        return OVOID_ERROR_MEMORY;
-    for (size_t g = 0; g < images->count; ++g)
-        back[g] = ov_rigid_inverse(&images->image[g]);
-    if (j->ports > 0)
-        OV_TRY(ov_grid_of(context, j->port->at, sizeof *j->port, j->ports, PORT * images->spacing,
-                          &grid));
-    for (size_t k = 0; k < j->ports; ++k) {
-        const ov_survey_port *const port = &j->port[k];
-        const ov_survey_port *const other = find_port(j, &grid, port, &back[port->image]);
-        if (other)
-            ov_unite(j->whole, port->piece, other->piece);
-    }
-cleanup:
-    ov_grid_destroy(&grid);
-    free(back);
-    return status;
-}
-
-static void add_volumes(const ov_survey_cell *cells, size_t count, size_t n, joint *j) {
-    for (size_t c = 0; c < count; ++c)
-        for (size_t k = 0; k < cells[c].side[n].pieces; ++k) {
-            const uint32_t whole = ov_union_first(j->whole, (uint32_t)(j->first[c] + k));
-            j->volume[whole] += cells[c].side[n].piece[k].volume;
-        }
-}
-
-static bool is_outer(joint *j, size_t piece) {
-    return j->volume[ov_union_first(j->whole, (uint32_t)piece)] > 0.0;
-}
-
-static void add_side(const ov_survey_cell *cells, size_t count, size_t n, joint *j,
-                     ov_survey_total *total) {
-    for (size_t c = 0; c < count; ++c)
-        for (size_t k = 0; k < cells[c].side[n].pieces; ++k) {
-            const ov_survey_piece *const piece = &cells[c].side[n].piece[k];
-            const size_t at = j->first[c] + k;
-            const bool outer = is_outer(j, at), first = j->whole[at] == at;
-            total->area[n] += piece->area;
-            total->volume[n] += piece->volume;
-            total->components[n] += first;
-            total->hausdorff = fmax(total->hausdorff, piece->furthest);
-            if (!outer)
-                continue;
-            total->area_outer[n] += piece->area;
-            total->volume_outer[n] += piece->volume;
-            total->outer[n] += first;
-            total->deviation = fmax(total->deviation, piece->furthest);
-        }
-}
-
-static ovoid_status add_spots(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                              size_t n, joint *j, size_t *capacity, ov_survey_total *total) {
-    ovoid_status status = OVOID_OK;
-    for (size_t c = 0; c < count; ++c) {
-        const ov_survey_side *const side = &cells[c].side[n];
-        for (size_t k = 0; k < side->spots; ++k) {
-            if (!is_outer(j, j->first[c] + side->spot_on[k]))
-                continue;
-            OV_TRY(ov_grow(context, &total->spot, capacity, total->spots + 1, sizeof *total->spot,
-                           "spots"));
-            total->spot[total->spots++] = side->spot[k];
-        }
-    }
-cleanup:
-    return status;
-}
-
-ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                            const ov_survey_images *images, double apart, ov_survey_total *total) {
-    ovoid_status status = OVOID_OK;
-    ov_survey_total made = {0};
-    size_t capacity = 0;
-    for (size_t n = 0; n < OV_SURVEY_SIDES && status == OVOID_OK; ++n) {
-        joint j = {0};
-        status = joint_create(context, cells, count, n, &j);
-        if (status == OVOID_OK) {
-            join(cells, count, n, &j);
-            status = images->count > 1 ? join_images(context, images, &j) : OVOID_OK;
-        }
-        if (status == OVOID_OK) {
-            add_volumes(cells, count, n, &j);
-            add_side(cells, count, n, &j, &made);
-            status = add_spots(context, cells, count, n, &j, &capacity, &made);
-        }
-        joint_destroy(&j);
-    }
-    OV_TRY(status);
-    OV_TRY(ov_spots_thin(context, made.spot, &made.spots, apart, SIZE_MAX));
-    *total = made;
-    made = (ov_survey_total){0};
-cleanup:
-    ov_survey_total_destroy(&made);
-    return status;
-}
-
-void ov_survey_total_destroy(ov_survey_total *total) {
-    free(total->spot);
-    *total = (ov_survey_total){0};
 }

@@ -140,6 +140,27 @@ cleanup:
     return status;
 }
 
+ovoid_status ov_trail_choose(ovoid_context *context, const ovoid_mesh *mesh, const bool *chosen,
+                             ov_trail *trail) {
+    ovoid_status status = OVOID_OK;
+    ov_trail made = {.mesh = mesh};
+    for (size_t t = 0; t < mesh->triangles; ++t)
+        made.triangles += chosen[t];
+    made.triangle = ov_alloc(context, made.triangles, sizeof *made.triangle, "order of triangles");
+    if (!made.triangle)
+        return OVOID_ERROR_MEMORY;
+    made.triangles = 0;
+    for (size_t t = 0; t < mesh->triangles; ++t)
+        if (chosen[t])
+            made.triangle[made.triangles++] = (uint32_t)t;
+    OV_TRY(list_vertices(context, &made));
+    *trail = made;
+cleanup:
+    if (status != OVOID_OK)
+        ov_trail_destroy(&made);
+    return status;
+}
+
 void ov_trail_destroy(ov_trail *trail) {
     free(trail->triangle);
     free(trail->vertex);

@@ -18,6 +18,9 @@ typedef struct ov_trail {
  * follows a curve itself costs nothing here. */
 ovoid_status ov_trail_create(ovoid_context *context, const ovoid_mesh *mesh, bool outer_only,
                              ov_trail *trail);
+/* The triangles for which chosen holds, and their vertices, of a mesh that follows a curve. */
+ovoid_status ov_trail_choose(ovoid_context *context, const ovoid_mesh *mesh, const bool *chosen,
+                             ov_trail *trail);
 void ov_trail_destroy(ov_trail *trail);
 
 static inline uint32_t ov_trail_triangle(const ov_trail *trail, size_t k) {

@@ -53,6 +53,8 @@ typedef struct ov_marcher {
     size_t new_vertices, new_triangles; /* of the piece */
 
     ov_brick_grid grid;
+    double clip[2][3];   /* the box that they end at, angstrom, */
+    bool clipped;        /* if there is one */
     uint64_t wanted[3];  /* points of pieces, so that the grid stays; 0: nothing is wanted */
     double grid_spacing; /* angstrom */
     bool ghosts_empty;   /* on the device */
@@ -958,7 +960,7 @@ static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
     const double cutoff = OV_MARCH_CUTOFF * o->isovalue;
     ov_pieces *const best = &m->pieces;
     OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit,
-                            m->wanted, best));
+                            m->wanted, m->clipped ? m->clip : NULL, best));
     sparse = (double)best->count[0] * (double)best->count[1] * (double)best->count[2] >
              EMPTY_SHARE * (double)best->pieces;
     for (size_t k = 0; k < sizeof sparse_limits / sizeof *sparse_limits; ++k) {
@@ -966,7 +968,7 @@ static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
         if (k == 0 ? points_of(best) <= EMPTY_POINTS : !sparse)
             continue;
         OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing,
-                                sparse_limits[k], m->wanted, &other));
+                                sparse_limits[k], m->wanted, m->clipped ? m->clip : NULL, &other));
         if (cost_of(&other) < cost_of(best)) {
             const ov_pieces swap = *best;
             *best = other;
@@ -1085,6 +1087,12 @@ void ov_marcher_stay(ov_marcher *m) {
         m->wanted[axis] = m->grid.bricks[axis] * brick_points[axis] + WANTED_MORE;
         m->wanted[axis] = m->wanted[axis] < limit[axis] ? m->wanted[axis] : limit[axis];
     }
+}
+
+void ov_marcher_clip(ov_marcher *m, const double low[3], const double high[3]) {
+    memcpy(m->clip[0], low, sizeof m->clip[0]);
+    memcpy(m->clip[1], high, sizeof m->clip[1]);
+    m->clipped = true;
 }
 
 void ov_marcher_begin(ov_marcher *m) {

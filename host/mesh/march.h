@@ -47,6 +47,10 @@ void ov_marcher_stay(ov_marcher *marcher);
  * size of pieces stays. */
 void ov_marcher_begin(ov_marcher *marcher);
 
+/* The next meshes end at this box, which may be endless: only what lies in it, less a few steps of
+ * the lattice, is what the whole mesh would have there. */
+void ov_marcher_clip(ov_marcher *marcher, const double low[3], const double high[3]);
+
 /* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The light one knows its
  * components only after ov_mesh_finish(), so that the device can have something to do meanwhile;
  * normals: whether it is to have them. */

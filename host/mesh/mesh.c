@@ -180,6 +180,28 @@ cleanup:
     return status;
 }
 
+void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
+                           ov_content *content) {
+    double a[3], u[3], v[3], normal[3];
+    corners_at(mesh, triangle, a, u, v);
+    subtract(u, a, u);
+    subtract(v, a, v);
+    subtract(a, origin, a);
+    cross(u, v, normal);
+    content->area += 0.5 * sqrt(dot(normal, normal));
+    content->volume += dot(a, normal) / 6.0;
+}
+
+void ov_mesh_flat_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]) {
+    double a[3], u[3], v[3], normal[3];
+    corners_at(mesh, triangle, a, u, v);
+    subtract(u, a, u);
+    subtract(v, a, v);
+    cross(u, v, normal);
+    for (size_t k = 0; k < 3; ++k)
+        vector[k] += 0.5 * normal[k];
+}
+
 /* Flat areas and volumes. Each component has its own origin, one of its vertices, so that little
  * cancels; where it is closed the origin does not matter. */
 static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh) {
@@ -191,15 +213,12 @@ static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh)
         first[mesh->component_of[v]] = (uint32_t)v;
     for (size_t t = 0; t < mesh->triangles; ++t) {
         const uint32_t c = mesh->component_of[mesh->corners[3 * t]];
-        double origin[3], a[3], u[3], v[3], normal[3];
+        ov_content content = {mesh->component[c].area, mesh->component[c].volume};
+        double origin[3];
         ov_mesh_at(mesh, first[c], origin);
-        corners_at(mesh, t, a, u, v);
-        subtract(u, a, u);
-        subtract(v, a, v);
-        subtract(a, origin, a);
-        cross(u, v, normal);
-        mesh->component[c].area += 0.5 * sqrt(dot(normal, normal));
-        mesh->component[c].volume += dot(a, normal) / 6.0;
+        ov_mesh_flat_triangle(mesh, t, origin, &content);
+        mesh->component[c].area = content.area;
+        mesh->component[c].volume = content.volume;
     }
     for (size_t c = 0; c < mesh->components; ++c)
         mesh->component[c].outer = mesh->component[c].volume > 0.0;
@@ -513,6 +532,22 @@ void ov_mesh_smooth_triangle(const ovoid_mesh *mesh, size_t triangle, const doub
     bent_triangle bent;
     bend(mesh, triangle, origin, &bent);
     integrate_bent(&bent, content);
+}
+
+/* Bending adds the areas between the edges and their chords: over a chord e the curve encloses with
+ * it b x e / 6, where b is four times its height. */
+void ov_mesh_smooth_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]) {
+    const double zero[3] = {0.0, 0.0, 0.0};
+    bent_triangle bent;
+    ov_mesh_flat_vector(mesh, triangle, vector);
+    bend(mesh, triangle, zero, &bent);
+    for (size_t i = 0; i < 3; ++i) {
+        double edge[3], area[3];
+        subtract(bent.p[(i + 1) % 3], bent.p[i], edge);
+        cross(bent.b[i], edge, area);
+        for (size_t k = 0; k < 3; ++k)
+            vector[k] += area[k] / 6.0;
+    }
 }
 
 ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,

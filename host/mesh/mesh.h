@@ -90,6 +90,15 @@ ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only);
 void ov_mesh_smooth_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
                              ov_content *content);
 
+/* The same of the flat one. */
+void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
+                           ov_content *content);
+
+/* Adds the vector area of either: what moving the origin adds to the volume is a third of its
+ * product with the way back. */
+void ov_mesh_smooth_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]);
+void ov_mesh_flat_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]);
+
 /* Either of them, asking on the way whether to go on. */
 ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
                              bool outer_only, ov_content *result);

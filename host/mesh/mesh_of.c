@@ -1,9 +1,10 @@
 /* From a field to a mesh of its surface. */
+#include "mesh/mesh_of.h"
+
 #include "base/progress.h"
 #include "base/sized.h"
 #include "field/field.h"
 #include "mesh/march.h"
-#include "model/fields.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -20,9 +21,8 @@ void ovoid_mesh_options_init(ovoid_mesh_options *options, size_t size) {
     ov_sized_init(options, size, &defaults, sizeof defaults);
 }
 
-/* The caller's options, whole and within their ranges. */
-static ovoid_status take_options(ovoid_context *context, const ovoid_mesh_options *given,
-                                 const ovoid_field *field, ovoid_mesh_options *options) {
+ovoid_status ov_mesh_options_take(ovoid_context *context, const ovoid_mesh_options *given,
+                                  const ovoid_field *field, ovoid_mesh_options *options) {
     ovoid_mesh_options_init(options, sizeof *options);
     const ovoid_status status = OV_SIZED_TAKE(context, ovoid_mesh_options, given, options);
     if (status != OVOID_OK)
@@ -41,24 +41,28 @@ static ovoid_status take_options(ovoid_context *context, const ovoid_mesh_option
     return OVOID_OK;
 }
 
-/* Names an ellipsoid that the kernels' floats cannot hold by its number in the model. */
-static ovoid_status check_ellipsoids(ovoid_context *context, const ovoid_field *field,
-                                     double cutoff) {
+ovoid_status ov_field_check_ellipsoids(ovoid_context *context, const ovoid_field *field,
+                                       double isovalue) {
     ov_terms terms = {0};
+    if (!field->model)
+        return OVOID_OK;
     const ovoid_status status = ov_terms_set(context, &terms, field->quadrics, field->count,
-                                             field->quadrics[0].centre, cutoff);
+                                             field->quadrics[0].centre, OV_MARCH_CUTOFF * isovalue);
     ov_terms_destroy(&terms);
     return status;
 }
 
-/* Where the Gaussians reach: what their parameters tell more exactly than their quadratic forms. */
+void ov_body_of_field(const ovoid_field *field, size_t i, ov_body *body) {
+    if (field->model)
+        ov_body_of_ellipsoid(&field->model->ellipsoids[i], body);
+    else
+        ov_body_of_ball(&field->quadrics[i], field->decay, body);
+}
+
 static ov_body *bodies_of(ovoid_context *context, const ovoid_field *field) {
     ov_body *const bodies = ov_alloc(context, field->count, sizeof *bodies, "a surface's terms");
     for (size_t i = 0; bodies && i < field->count; ++i)
-        if (field->model)
-            ov_body_of_ellipsoid(&field->model->ellipsoids[i], &bodies[i]);
-        else
-            ov_body_of_ball(&field->quadrics[i], field->decay, &bodies[i]);
+        ov_body_of_field(field, i, &bodies[i]);
     return bodies;
 }
 
@@ -73,11 +77,10 @@ ovoid_status ovoid_field_mesh(ovoid_context *context, ovoid_field *field,
     OV_NEED(context, mesh);
     ov_progress_begin(context, "mesh");
     OV_TRY(ov_field_check(context, field));
-    OV_TRY(take_options(context, options, field, &o));
+    OV_TRY(ov_mesh_options_take(context, options, field, &o));
     if (!(bodies = bodies_of(context, field)))
         OV_TRY(OVOID_ERROR_MEMORY);
-    if (field->model)
-        OV_TRY(check_ellipsoids(context, field, OV_MARCH_CUTOFF * o.isovalue));
+    OV_TRY(ov_field_check_ellipsoids(context, field, o.isovalue));
     OV_TRY(ov_mesh_bodies(context, bodies, field->count, &o, mesh));
 cleanup:
     free(bodies);

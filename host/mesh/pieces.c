@@ -152,17 +152,30 @@ static bool bounds(const planner *p, double low[3], double high[3]) {
     return any;
 }
 
+/* Ends the box, as lattice indices, where another one does. False if nothing is left. */
+static bool cut_off(double spacing, double clip[2][3], double low[3], double high[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = fmax(low[axis], floor(clip[0][axis] / spacing));
+        high[axis] = fmin(high[axis], ceil(clip[1][axis] / spacing));
+        if (low[axis] > high[axis])
+            return false;
+    }
+    return true;
+}
+
 /* A piece grows by this factor at most, along an axis, to be as large as is wanted. */
 #define WANTED_MOST 1.25
 
 /* Cuts the box, grown by one point for the cells below it, into equal pieces of whole bricks. */
 static ovoid_status plan(ovoid_context *context, const planner *p, const uint64_t limit[3],
-                         const uint64_t wanted[3]) {
+                         const uint64_t wanted[3], double clip[2][3]) {
     ov_pieces *const pieces = p->pieces;
     double low[3] = {0}, high[3] = {0}, total = 1.0;
     if (!bounds(p, low, high))
         return OVOID_OK;
     tighten(p, low, high);
+    if (clip && !cut_off(pieces->spacing, clip, low, high))
+        return OVOID_OK;
     for (int axis = 0; axis < 3; ++axis) {
         if (!(low[axis] > -INDEX_LIMIT && high[axis] < INDEX_LIMIT))
             return fail_large(context, pieces->spacing);
@@ -335,7 +348,7 @@ static ovoid_status sort_pairs(ovoid_context *context, planner *p) {
 
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,
                               double isovalue, double cutoff, double spacing,
-                              const uint64_t limit[3], const uint64_t wanted[3],
+                              const uint64_t limit[3], const uint64_t wanted[3], double clip[2][3],
                               ov_pieces *pieces) {
     ovoid_status status = OVOID_OK;
     ov_pieces made = {.spacing = spacing};
@@ -345,7 +358,7 @@ ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, siz
                  .cutoff = cutoff,
                  .threshold = fmax(isovalue / (double)count, cutoff),
                  .pieces = &made};
-    OV_TRY(plan(context, &p, limit, wanted));
+    OV_TRY(plan(context, &p, limit, wanted, clip));
     if (made.count[0] > 0)
         OV_TRY(sort_pairs(context, &p));
 cleanup:

@@ -45,10 +45,12 @@ typedef struct ov_pieces {
  * bricks within the limit; NULL: nothing is. Where no term reaches isovalue / count, phi <
  * isovalue; so a piece in which none does, one lattice step about it included, is left out. A piece
  * has the terms that reach cutoff in it, the lattice step included. OVOID_ERROR_LIMIT when the
- * lattice is too large. No pieces at all are not an error here. */
+ * lattice is too large. No pieces at all are not an error here. clip: a box, angstrom, at
+ * which the lattice ends; NULL: none. */
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,
                               double isovalue, double cutoff, double spacing,
-                              const uint64_t limit[3], const uint64_t wanted[3], ov_pieces *pieces);
+                              const uint64_t limit[3], const uint64_t wanted[3], double clip[2][3],
+                              ov_pieces *pieces);
 void ov_pieces_destroy(ov_pieces *pieces);
 
 /* Position of the first of ascending keys that is this one or higher; count where there is none. */

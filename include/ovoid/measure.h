@@ -16,12 +16,18 @@ typedef struct ovoid_pair { /* 24 bytes */
     double error;           /* |sparse - original| / original */
 } ovoid_pair;
 
+/* Surfaces of more atoms, or ellipsoids, than this are measured cell by cell, in cells of so many.
+ */
+#define OVOID_DEFAULT_MEASURE_ATOMS 65536
+#define OVOID_DEFAULT_CELL_ATOMS 16384
+
 typedef struct ovoid_measure_options {
     size_t size;
     double isovalue; /* of both surfaces; 0: that of the original's field */
     double spacing;  /* of both meshes, angstrom */
     ovoid_vertex_rule vertices;
-    bool distances; /* also compute distances */
+    bool distances;      /* also compute distances */
+    uint32_t cell_atoms; /* of a cell at most, so that memory follows a cell; 0: as above */
 } ovoid_measure_options;
 
 typedef struct ovoid_measures {
@@ -49,7 +55,7 @@ OVOID_API void ovoid_measure_options_init(ovoid_measure_options *options, size_t
 OVOID_API void ovoid_measures_init(ovoid_measures *measures, size_t size);
 
 /* Meshes both surfaces on the same lattice and compares them; measures was made by
- * ovoid_measures_init(). */
+ * ovoid_measures_init(). Large ones are meshed cell by cell, with the same numbers to rounding. */
 OVOID_API ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original,
                                      ovoid_field *sparse, const ovoid_measure_options *options,
                                      ovoid_measures *measures);

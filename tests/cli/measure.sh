@@ -29,6 +29,14 @@ cmp ../first ../second || fail "a fit and a measurement of its model should agre
 run "$CHECK_MEASURES" fit.json m.json isovalue=1 mesh_spacing=0.5 atoms=12
 expect_code 0
 
+# Cell by cell it is the same.
+grep -E '^(area|volume|pieces|distance|mesh)' "$out" >../second
+run "$OVOID" measure a.xyzr a.ovoid --cell-atoms 3
+expect_code 0
+grep -E '^(area|volume|pieces|distance|mesh)' "$out" >../third
+cmp ../second ../third || fail "cells should add up to the whole"
+grep -q '^area' ../third || fail "measures were expected"
+
 # A row for each isovalue; one without a surface costs its row alone.
 run "$OVOID" measure a.xyzr a.ovoid --isovalue 1,0.5,1e6,2 --report rows.json --spacing 0.6 \
     --vertices linear

@@ -6,8 +6,8 @@
 #define OV_FIT_PART_H
 
 #include "fit/adaptive/adaptive.h"
-#include "fit/parts/partition.h"
 #include "fit/parts/ranks.h"
+#include "measure/partition.h"
 #include "measure/survey.h"
 
 /* What a part came to. found.owner: of its atoms in the partition's order. */

@@ -267,7 +267,8 @@ static ovoid_status survey(ovoid_context *context, job *j) {
         .unpack = survey_unpack};
     const ov_survey_images images = {.image = cut->image,
                                      .count = cut->images,
-                                     .spacing = j->parts->options->adaptive.mesh_spacing};
+                                     .spacing = j->parts->options->adaptive.mesh_spacing,
+                                     .centre = j->parts->centre};
     ov_progress_stage(context, "measure");
     OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, jobs_of(j->parts), &work));
     ov_survey_total_destroy(&j->total);

@@ -6,7 +6,7 @@
 #ifndef OV_FIT_WORKERS_H
 #define OV_FIT_WORKERS_H
 
-#include "fit/parts/partition.h"
+#include "measure/partition.h"
 
 typedef struct ov_part_work {
     const bool *todo; /* of each part, whether it is to be worked on; NULL: all are */

@@ -218,6 +218,7 @@ MeasureOptions = _structure(
     ("spacing", c_double),
     ("vertices", c_int),
     ("distances", c_bool),
+    ("cell_atoms", c_uint32),
 )
 Measures = _structure(
     "ovoid_measures",

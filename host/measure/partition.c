@@ -1,4 +1,4 @@
-#include "fit/parts/partition.h"
+#include "measure/partition.h"
 
 #include "base/progress.h"
 

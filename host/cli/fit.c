@@ -93,6 +93,12 @@ static bool check_goal(const fit_job *job) {
     return false;
 }
 
+/* Half the ellipsoids; of a symmetric assembly as many of each unit, while that can be. */
+static uint32_t half_of(const ovoid_fit_result *result) {
+    const uint64_t half = result->ellipsoids / 2, units = result->units;
+    return (uint32_t)(units <= half ? half / units * units : half);
+}
+
 /* The goal's model, or after it one with half the ellipsoids of the level before: that one begins
  * with the atoms, too, for they merge better than what has been fitted. */
 static ovoid_status fit_model(fit_job *job, size_t level) {
@@ -100,7 +106,7 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
     fit_level *now = &job->levels[level];
     if (level > 0) {
         options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
-        options.adaptive.ellipsoids = (uint32_t)(now[-1].result.ellipsoids / 2);
+        options.adaptive.ellipsoids = half_of(&now[-1].result);
     }
     ovoid_fit_result_init(&now->result, sizeof now->result);
     if (level > 0 && job->session) {

@@ -106,6 +106,8 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
         add_number(b, "solver_iterations", (double)result->adaptive.solver_iterations);
     if (!l1)
         add_number(b, "parts", (double)result->parts);
+    if (!l1)
+        add_number(b, "units", (double)result->units);
     if (level->measured)
         b->good = b->good && measures_report(b->object, &level->measures, &job->measuring);
 }

@@ -47,7 +47,9 @@ static uint64_t hash_options(const ovoid_fit_options *options) {
 static ovoid_status make_header(ovoid_context *context, const ov_parts *parts, header *made) {
     *made = (header){.magic = MAGIC,
                      .version = ov_hash(ovoid_version(), strlen(ovoid_version())),
-                     .input = ov_hash(parts->xyzr, 4 * parts->atoms * sizeof *parts->xyzr),
+                     .input = with(ov_hash(parts->xyzr, 4 * parts->atoms * sizeof *parts->xyzr),
+                                   parts->partition.image,
+                                   parts->partition.images * sizeof *parts->partition.image),
                      .options = hash_options(parts->options),
                      .parts = parts->partition.count};
     return ov_device_hash(context, &made->device);

@@ -216,16 +216,6 @@ cleanup:
     return status;
 }
 
-/* As it was before its task, for another device to try. */
-static void forget(patch *one) {
-    free(one->ellipsoid);
-    free(one->atom);
-    free(one->image);
-    one->ellipsoid = one->atom = one->image = NULL;
-    one->ellipsoids = one->atoms = 0;
-    ov_found_destroy(&one->fit.found);
-}
-
 static uint32_t image_of_nearest(const ov_parts *parts, const patch *one, const double at[3]) {
     double least = INFINITY;
     uint32_t image = 0;
@@ -259,6 +249,16 @@ static ovoid_status bring_home(ovoid_context *context, const patches *all, patch
         }
     free(image);
     return OVOID_OK;
+}
+
+/* As it was before its task, for another device to try. */
+static void forget(patch *one) {
+    free(one->ellipsoid);
+    free(one->atom);
+    free(one->image);
+    one->ellipsoid = one->atom = one->image = NULL;
+    one->ellipsoids = one->atoms = 0;
+    ov_found_destroy(&one->fit.found);
 }
 
 static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *user) {

@@ -7,6 +7,7 @@
 
 #include "fit/adaptive/adaptive.h"
 #include "fit/parts/partition.h"
+#include "fit/parts/ranks.h"
 #include "measure/survey.h"
 
 /* What a part came to. found.owner: of its atoms in the partition's order. */
@@ -20,6 +21,7 @@ typedef struct ov_parts {
     size_t atoms;
     const ovoid_fit_options *options;
     const double *centre; /* angstrom: that the images of all lie about; NULL: there are none */
+    ov_ranks *ranks;      /* that share it */
     double margin; /* angstrom: this far from the box of its centres a part's surface is judged, */
     double reach;  /* and what is this far from it counts there */
     ov_partition partition;

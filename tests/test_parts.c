@@ -73,13 +73,18 @@ static void expect_cells(const ov_partition *cut) {
     }
 }
 
+/* To be cut: without images. */
+static ov_partition alone(double near) {
+    return (ov_partition){.near = near, .image = &ov_rigid_identity, .images = 1};
+}
+
 static void atoms_are_shared_out(void **state) {
     ovoid_molecule *molecule = ball(*state, 1000);
     const double *const xyzr = ovoid_molecule_xyzr(molecule);
     const size_t most[] = {1, 64, 130, 999, 1000, 5000};
     for (size_t n = 0; n < sizeof most / sizeof *most; ++n) {
-        ov_partition cut = {0};
-        test_check(*state, ov_partition_create(*state, xyzr, 1000, most[n], 6.0, &cut));
+        ov_partition cut = alone(6.0);
+        test_check(*state, ov_partition_create(*state, xyzr, 1000, most[n], &cut));
         assert_in_range(cut.count, (1000 + most[n] - 1) / most[n], 2 * 1000 / most[n] + 1);
         expect_partition(xyzr, 1000, most[n], &cut);
         expect_cells(&cut);
@@ -91,10 +96,10 @@ static void atoms_are_shared_out(void **state) {
 /* Atoms that are all in one place, or in two. */
 static void level_atoms_are_shared_out(void **state) {
     double xyzr[4 * 100] = {0};
-    ov_partition cut = {0};
+    ov_partition cut = alone(1.0);
     for (size_t i = 0; i < 100; ++i)
         xyzr[4 * i + 1] = i < 70 ? 1.0 : 2.0;
-    test_check(*state, ov_partition_create(*state, xyzr, 100, 8, 1.0, &cut));
+    test_check(*state, ov_partition_create(*state, xyzr, 100, 8, &cut));
     expect_partition(xyzr, 100, 8, &cut);
     assert_int_equal(cut.count, 16);
     ov_partition_destroy(&cut);
@@ -143,18 +148,19 @@ static void cells_add_up(void **state) {
     ov_quadric *const original = atoms_of(molecule, 0.0), *const moved = atoms_of(molecule, 0.6);
     ovoid_model *model = model_of(*state, moved, atoms);
     ovoid_measures wanted;
-    ov_partition cut = {0};
+    ov_partition cut = alone(6.0);
     ov_survey_total total = {0};
     const ov_survey_options options = {.isovalue = 1.0, .spacing = 0.5, .least = 0.4};
+    const ov_survey_images images = {.image = cut.image, .count = 1, .spacing = 0.5};
     measure(*state, molecule, model, &wanted);
     assert_true(wanted.components_original > 1 && wanted.components_sparse > 1);
-    test_check(*state, ov_partition_create(*state, ovoid_molecule_xyzr(molecule), atoms, atoms / 8,
-                                           6.0, &cut));
+    test_check(*state,
+               ov_partition_create(*state, ovoid_molecule_xyzr(molecule), atoms, atoms / 8, &cut));
     ov_survey_cell *const cells = test_alloc(cut.count, sizeof *cells);
     for (size_t p = 0; p < cut.count; ++p)
         test_check(*state, ov_survey(*state, &options, original, atoms, moved, atoms,
                                      cut.part[p].cell.low, cut.part[p].cell.high, &cells[p]));
-    test_check(*state, ov_survey_join(*state, cells, cut.count, 3.0, &total));
+    test_check(*state, ov_survey_join(*state, cells, cut.count, &images, 3.0, &total));
     assert_int_equal(total.components[0], wanted.components_original);
     assert_int_equal(total.components[1], wanted.components_sparse);
     assert_int_equal(total.outer[0], wanted.outer_original);

@@ -81,15 +81,18 @@ ovoid_status __wrap_ov_part_fit_atoms(ovoid_context *context, const ov_parts *pa
 }
 
 ovoid_status __real_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
-                                   size_t count, double apart, ov_survey_total *total);
+                                   size_t count, const ov_survey_images *images, double apart,
+                                   ov_survey_total *total);
 ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
-                                   size_t count, double apart, ov_survey_total *total);
+                                   size_t count, const ov_survey_images *images, double apart,
+                                   ov_survey_total *total);
 ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
-                                   size_t count, double apart, ov_survey_total *total) {
+                                   size_t count, const ov_survey_images *images, double apart,
+                                   ov_survey_total *total) {
     const rank *const r = rank_of(context, all_ranks, RANKS_MOST);
     if (r && r->fails_to_join)
         return ov_fail(context, OVOID_ERROR_NUMERIC, "made to fail behind the others' backs");
-    return __real_ov_survey_join(context, cells, count, apart, total);
+    return __real_ov_survey_join(context, cells, count, images, apart, total);
 }
 
 static atomic_uint patches; /* rounds of mending, of all ranks */

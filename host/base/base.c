@@ -169,6 +169,14 @@ void *ov_alloc(ovoid_context *context, size_t count, size_t size, const char *wh
     return memory;
 }
 
+void *ov_copy(ovoid_context *context, const void *from, size_t count, size_t size,
+              const char *what) {
+    void *const copy = ov_alloc(context, count, size, what);
+    if (copy && count > 0)
+        memcpy(copy, from, count * size);
+    return copy;
+}
+
 ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capacity, size_t need,
                      size_t size, const char *what) {
     if (need <= *capacity)

@@ -47,6 +47,10 @@ ov_warn(ovoid_context *context, const char *format, ...);
  * records OVOID_ERROR_MEMORY with `what`. Free with free(). */
 void *ov_alloc(ovoid_context *context, size_t count, size_t size, const char *what);
 
+/* The same with what is at from[count * size] in it. */
+void *ov_copy(ovoid_context *context, const void *from, size_t count, size_t size,
+              const char *what);
+
 /* Grows *array to hold at least `need` elements of `size` bytes; *capacity counts elements. Growth
  * is geometric. The new part is not cleared. */
 ovoid_status ov_grow(ovoid_context *context, void *array_pointer, size_t *capacity, size_t need,

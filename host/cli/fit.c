@@ -93,25 +93,33 @@ static bool check_goal(const fit_job *job) {
     return false;
 }
 
-/* Whether other ranks take part: in what is cut into parts. Says so where they cannot. */
-static bool is_shared(const fit_job *job) {
+/* Why other ranks cannot take part; NULL: they can. */
+static const char *alone_because(const fit_job *job) {
     const ovoid_fit_options *options = &job->options;
     const size_t atoms = ovoid_molecule_atoms(job->molecule);
     const size_t whole = options->parts.atoms ? options->parts.atoms : OVOID_DEFAULT_WHOLE_ATOMS;
+    size_t placements;
+    if (options->method != OVOID_METHOD_ADAPTIVE)
+        return "a fit by method l1 has no parts that ranks could share";
+    if (job->session)
+        return "models of one file follow one another";
+    if (options->parts.symmetry == OVOID_SYMMETRY_USE &&
+        ovoid_molecule_placements(job->molecule, &placements) && placements > 1)
+        return "ranks share an assembly only without its symmetry (--no-symmetry)";
+    if (atoms <= whole)
+        return "a molecule of one part cannot be shared, and --part-atoms makes parts of fewer "
+               "atoms";
+    return NULL;
+}
+
+/* Whether other ranks take part: in what is cut into parts. Says so where they cannot. */
+static bool is_shared(const fit_job *job) {
     static bool said;
-    if (ranks_count() == 1)
-        return false;
-    if (options->method == OVOID_METHOD_ADAPTIVE && atoms > whole && !job->session)
-        return true;
-    if (!said && !job->quiet)
-        cli_warning("rank 0 of %u works alone: %s", (unsigned)ranks_count(),
-                    options->method != OVOID_METHOD_ADAPTIVE
-                        ? "a fit by method l1 has no parts that ranks could share"
-                    : job->session ? "models of one file follow one another"
-                                   : "a molecule of one part cannot be shared, and --part-atoms "
-                                     "makes parts of fewer atoms");
-    said = true;
-    return false;
+    const char *const why = ranks_count() > 1 ? alone_because(job) : NULL;
+    if (why && !said && !job->quiet)
+        cli_warning("rank 0 of %u works alone: %s", (unsigned)ranks_count(), why);
+    said = said || why;
+    return ranks_count() > 1 && !why;
 }
 
 static ovoid_status reach(fit_job *job, const ovoid_fit_options *options, fit_level *now) {
@@ -127,6 +135,12 @@ static ovoid_status reach(fit_job *job, const ovoid_fit_options *options, fit_le
     return status;
 }
 
+/* Half the ellipsoids; of a symmetric assembly as many of each unit, while that can be. */
+static uint32_t half_of(const ovoid_fit_result *result) {
+    const uint64_t half = result->ellipsoids / 2, units = result->units;
+    return (uint32_t)(units <= half ? half / units * units : half);
+}
+
 /* The goal's model, or after it one with half the ellipsoids of the level before: that one begins
  * with the atoms, too, for they merge better than what has been fitted. */
 static ovoid_status fit_model(fit_job *job, size_t level) {
@@ -134,7 +148,7 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
     fit_level *now = &job->levels[level];
     if (level > 0) {
         options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
-        options.adaptive.ellipsoids = (uint32_t)(now[-1].result.ellipsoids / 2);
+        options.adaptive.ellipsoids = half_of(&now[-1].result);
     }
     ovoid_fit_result_init(&now->result, sizeof now->result);
     if (level > 0 && job->session) {

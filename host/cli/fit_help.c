@@ -111,6 +111,10 @@ static void print_adaptive(const ovoid_fit_options *defaults, FILE *stream) {
                     "go on from the file of --checkpoint, if it is there; one of other atoms, "
                     "options, device or version is refused",
                     stream);
+    cli_option_help("--no-symmetry",
+                    "fit all of a symmetric assembly, instead of one unit among its images that is "
+                    "repeated then",
+                    stream);
 }
 
 static void print_l1(const ovoid_fit_options *defaults, FILE *stream) {

@@ -42,8 +42,11 @@ static void print_settings(const fit_job *job, char *text, size_t size) {
             used += (size_t)snprintf(text + used, size - used, ", mesh-spacing %.9g",
                                      options->adaptive.mesh_spacing);
         if (used < size && job->levels[0].result.parts > 1) /* the model depends on them alone */
-            snprintf(text + used, size - used, ", parts %llu",
-                     (unsigned long long)job->levels[0].result.parts);
+            used += (size_t)snprintf(text + used, size - used, ", parts %llu",
+                                     (unsigned long long)job->levels[0].result.parts);
+        if (used < size && job->levels[0].result.units > 1)
+            snprintf(text + used, size - used, ", units %llu",
+                     (unsigned long long)job->levels[0].result.units);
         return;
     }
     used = append_numbers(fit_l1_numbers, fit_l1_count, options, text, size, used);

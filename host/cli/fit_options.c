@@ -133,6 +133,7 @@ enum {
     MESH_SPACING,
     CHECKPOINT,
     RESUME,
+    NO_SYMMETRY,
     LEVELS,
     TIME_LIMIT,
     PROFILE,
@@ -157,6 +158,7 @@ static const struct option named[] = {
     {"mesh-spacing", required_argument, NULL, MESH_SPACING},
     {"checkpoint", required_argument, NULL, CHECKPOINT},
     {"resume", no_argument, NULL, RESUME},
+    {"no-symmetry", no_argument, NULL, NO_SYMMETRY},
     {"levels", required_argument, NULL, LEVELS},
     {"time-limit", required_argument, NULL, TIME_LIMIT},
     {"profile", no_argument, NULL, PROFILE},
@@ -421,6 +423,10 @@ static bool parse_named(parser *p, int option) {
     case RESUME:
         p->adaptive = "resume";
         job->options.parts.resume = 1;
+        return true;
+    case NO_SYMMETRY:
+        p->adaptive = "no-symmetry";
+        job->options.parts.symmetry = OVOID_SYMMETRY_IGNORE;
         return true;
     case PROFILE:
         job->profile.wanted = true;

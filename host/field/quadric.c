@@ -55,6 +55,28 @@ void ov_quadratic_form(double r[3][3], const double decay[3], double a[6]) {
     }
 }
 
+void ov_quadric_move(const ov_quadric *quadric, const ov_rigid *rigid, ov_quadric *moved) {
+    const double *const a = quadric->a;
+    const double whole[3][3] = {{a[0], a[1], a[2]}, {a[1], a[3], a[4]}, {a[2], a[4], a[5]}};
+    double left[3][3], turned[3][3]; /* R A, and R A R^T */
+    for (int j = 0; j < 3; ++j) {    /* A is symmetric: its rows are its columns */
+        double column[3];
+        ov_rigid_turn(rigid, whole[j], column);
+        for (int i = 0; i < 3; ++i)
+            left[i][j] = column[i];
+    }
+    for (int i = 0; i < 3; ++i)
+        ov_rigid_turn(rigid, left[i], turned[i]);
+    const ov_quadric made = {
+        .amplitude = quadric->amplitude,
+        .a = {turned[0][0], turned[0][1], turned[0][2], turned[1][1], turned[1][2], turned[2][2]}};
+    double centre[3];
+    ov_rigid_move(rigid, quadric->centre, centre);
+    *moved = made;
+    for (int k = 0; k < 3; ++k)
+        moved->centre[k] = centre[k];
+}
+
 void ov_quadric_of_atom(const double xyzr[4], double d, ov_quadric *quadric) {
     quadric->amplitude = exp(d * xyzr[3] * xyzr[3]);
     for (int k = 0; k < 3; ++k)

@@ -5,6 +5,8 @@
 #ifndef OV_QUADRIC_H
 #define OV_QUADRIC_H
 
+#include "base/rigid.h"
+
 #include <stdbool.h>
 
 /* amplitude * exp(-(x - centre)^T A (x - centre)); a = A's xx, xy, xz, yy, yz, zz (angstrom^-2). */
@@ -20,6 +22,9 @@ void ov_symmetric_axes(double a[3][3], double value[3], double axes[3][3]);
 
 /* A = R^T diag(decay) R, as xx, xy, xz, yy, yz, zz. */
 void ov_quadratic_form(double r[3][3], const double decay[3], double a[6]);
+
+/* The same Gaussian elsewhere. */
+void ov_quadric_move(const ov_quadric *quadric, const ov_rigid *rigid, ov_quadric *moved);
 
 /* ln of its value at a point. */
 double ov_quadric_log_value(const ov_quadric *quadric, const double at[3]);

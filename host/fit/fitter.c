@@ -12,7 +12,9 @@
 #include "model/factor.h"
 #include "model/model.h"
 #include "model/owner.h"
+#include "molecule/assembly.h"
 #include "molecule/molecule.h"
+#include "molecule/symmetry.h"
 #include "neighbours/neighbours.h"
 
 #include <math.h>
@@ -23,8 +25,11 @@ struct ovoid_fitter {
     ov_tenant tenant;
     ovoid_context *context; /* of the tenant, while that has one */
     bool once;
-    double *xyzr;
     size_t atoms;
+    double *xyzr;              /* of all of them; NULL: where the molecule has them */
+    ovoid_molecule *molecule;  /* of a symmetric assembly, of which one unit is fitted, */
+    ov_symmetry symmetry;      /* unless the order is 0 */
+    double *unit;              /* the unit's atoms */
     ovoid_fit_options surface; /* what defines it; method and goal are those of each fit */
     ov_adaptive *adaptive;     /* of the opened device; NULL until it is needed */
     ov_l1_band *band;          /* of method l1, likewise */
@@ -40,6 +45,49 @@ static void leave_device(ov_tenant *tenant) {
     ov_l1_band_destroy(&fitter->band);
 }
 
+/* All atoms, of an assembly where its placements have them. */
+static ovoid_status take_all(ovoid_fitter *fitter, const ovoid_molecule *molecule) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_molecule_expand(fitter->context, molecule));
+    const double *const xyzr = ovoid_molecule_xyzr(molecule);
+    OV_TRY(ov_atoms_check(fitter->context, xyzr, fitter->atoms, fitter->surface.decay));
+    fitter->xyzr = ov_alloc(fitter->context, 4 * fitter->atoms, sizeof *xyzr, "atoms");
+    if (!fitter->xyzr)
+        return OVOID_ERROR_MEMORY;
+    memcpy(fitter->xyzr, xyzr, 4 * fitter->atoms * sizeof *xyzr);
+cleanup:
+    return status;
+}
+
+/* One unit of a symmetric assembly; the others when they are needed. */
+static ovoid_status take_unit(ovoid_fitter *fitter, const ovoid_molecule *molecule) {
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = fitter->context;
+    OV_TRY(ov_symmetry_unit(context, molecule, &fitter->symmetry, &fitter->unit));
+    OV_TRY(
+        ov_atoms_check(context, fitter->unit, fitter->symmetry.unit_atoms, fitter->surface.decay));
+    OV_TRY(ov_molecule_copy_atoms(context, molecule, &fitter->molecule));
+cleanup:
+    return status;
+}
+
+static ovoid_status take_atoms(ovoid_fitter *fitter, const ovoid_molecule *molecule) {
+    if (fitter->surface.parts.symmetry != OVOID_SYMMETRY_IGNORE) {
+        const ovoid_status status = ov_symmetry_find(fitter->context, molecule, &fitter->symmetry);
+        if (status != OVOID_OK)
+            return status;
+    }
+    if (fitter->symmetry.order > 1)
+        return take_unit(fitter, molecule);
+    ov_symmetry_destroy(&fitter->symmetry);
+    return take_all(fitter, molecule);
+}
+
+/* Makes fitter->xyzr. */
+static ovoid_status need_all(ovoid_fitter *fitter) {
+    return fitter->xyzr ? OVOID_OK : take_all(fitter, fitter->molecule);
+}
+
 ovoid_status ov_fitter_create(ovoid_context *context, const ovoid_molecule *molecule,
                               const ovoid_fit_options *options, bool once, ovoid_fitter **fitter) {
     ovoid_status status = OVOID_OK;
@@ -49,19 +97,12 @@ ovoid_status ov_fitter_create(ovoid_context *context, const ovoid_molecule *mole
     ovoid_fit_options_init(&surface, sizeof surface);
     OV_TRY(OV_SIZED_TAKE(context, ovoid_fit_options, options, &surface));
     OV_TRY(ov_surface_options_check(context, &surface));
-    const double *const xyzr = ovoid_molecule_xyzr(molecule);
-    OV_TRY(ov_atoms_check(context, xyzr, atoms, surface.decay));
     made = ov_alloc(context, 1, sizeof *made, "a fitter");
     if (!made)
         return OVOID_ERROR_MEMORY;
     *made = (ovoid_fitter){.context = context, .once = once, .atoms = atoms, .surface = surface};
     ov_tenant_join(context, &made->tenant, leave_device);
-    made->xyzr = ov_alloc(context, 4 * atoms, sizeof *made->xyzr, "atoms");
-    if (!made->xyzr) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    memcpy(made->xyzr, xyzr, 4 * atoms * sizeof *xyzr);
+    OV_TRY(take_atoms(made, molecule));
     *fitter = made;
     made = NULL;
 cleanup:
@@ -84,6 +125,9 @@ void ovoid_fitter_destroy(ovoid_fitter **fitter) {
     ov_tenant_part(&(*fitter)->tenant);
     ov_found_destroy(&(*fitter)->start);
     ov_found_destroy(&(*fitter)->last);
+    ov_symmetry_destroy(&(*fitter)->symmetry);
+    ovoid_molecule_destroy(&(*fitter)->molecule);
+    free((*fitter)->unit);
     free((*fitter)->xyzr);
     free(*fitter);
     *fitter = NULL;
@@ -119,6 +163,7 @@ static ovoid_status fit_l1(ovoid_fitter *fitter, const ovoid_fit_options *option
                            ovoid_ellipsoid **ellipsoids, uint32_t **owner,
                            ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
+    OV_TRY(need_all(fitter));
     OV_TRY(
         ov_l1_band_prepare(fitter->context, fitter->xyzr, fitter->atoms, options, &fitter->band));
     result->sample_seconds = ov_seconds() - began;
@@ -149,6 +194,90 @@ static ovoid_status hand_over(ovoid_context *context, const ov_found *found, siz
     return OVOID_OK;
 }
 
+/* ---- one unit for all ------------------------------------------------------------------------ */
+
+/* Whether one unit is fitted: ellipsoids that are asked for have to be as many in each. */
+static bool is_fitted_by_unit(const ovoid_fitter *fitter, const ovoid_fit_options *options) {
+    const size_t order = fitter->symmetry.order;
+    return order > 0 && fitter->start.count == 0 && options->parts.symmetry == OVOID_SYMMETRY_USE &&
+           (options->adaptive.goal != OVOID_GOAL_ELLIPSOIDS ||
+            options->adaptive.ellipsoids % order == 0);
+}
+
+/* The owners of all atoms, whose units follow one another among the ellipsoids. */
+static void spread_owners(const ov_symmetry *symmetry, const ov_found *unit, uint32_t *owner) {
+    for (size_t g = 0; g < symmetry->order; ++g) {
+        const uint32_t *from = unit->owner;
+        for (size_t u = 0; u < symmetry->units; ++u) {
+            uint32_t *const to = owner + symmetry->first[g * symmetry->units + u];
+            for (size_t n = 0; n < symmetry->atoms[u]; ++n)
+                to[n] = (uint32_t)(g * unit->count) + *from++;
+        }
+    }
+}
+
+/* The unit's model becomes that of all of them. */
+static ovoid_status repeat_unit(ovoid_fitter *fitter, ov_found *found, ovoid_fit_result *result) {
+    const ov_symmetry *const symmetry = &fitter->symmetry;
+    const size_t order = symmetry->order;
+    ov_found made = {.tolerance = found->tolerance, .fewest = order * found->fewest};
+    if (found->count > UINT32_MAX / order)
+        return ov_fail(fitter->context, OVOID_ERROR_LIMIT,
+                       "%zu units of %zu ellipsoids are more than %lu", order, found->count,
+                       (unsigned long)UINT32_MAX);
+    made.count = order * found->count;
+    made.quadrics = ov_alloc(fitter->context, made.count, sizeof *made.quadrics, "ellipsoids");
+    made.owner = ov_alloc(fitter->context, fitter->atoms, sizeof *made.owner, "owners");
+    if (!made.quadrics || !made.owner) {
+        ov_found_destroy(&made);
+        return OVOID_ERROR_MEMORY;
+    }
+    memcpy(made.quadrics, found->quadrics, found->count * sizeof *found->quadrics);
+    for (size_t n = found->count; n < made.count; ++n)
+        ov_quadric_move(&found->quadrics[n % found->count], &symmetry->motion[n / found->count],
+                        &made.quadrics[n]);
+    spread_owners(symmetry, found, made.owner);
+    ov_found_destroy(found);
+    *found = made;
+    result->ellipsoids *= order;
+    result->units = order;
+    return OVOID_OK;
+}
+
+static ovoid_status reach_by_unit(ovoid_fitter *fitter, const ovoid_fit_options *options,
+                                  double began, ov_ranks *ranks, ov_found *found,
+                                  ovoid_fit_result *result) {
+    const ov_images images = {fitter->symmetry.motion, fitter->symmetry.order};
+    ovoid_fit_options of_unit = *options;
+    of_unit.adaptive.ellipsoids /= (uint32_t)images.count;
+    ovoid_status status = ov_parts_reach(fitter->context, fitter->unit, fitter->symmetry.unit_atoms,
+                                         &images, &of_unit, began, ranks, found, result);
+    if (found->count > 0) {
+        const ovoid_status repeated = repeat_unit(fitter, found, result);
+        status = repeated == OVOID_OK ? status : repeated;
+    }
+    return status;
+}
+
+static ovoid_status reach_with_all(ovoid_fitter *fitter, const ovoid_fit_options *options,
+                                   double began, ov_ranks *ranks, ov_found *found,
+                                   ovoid_fit_result *result) {
+    static const ov_images alone = {&ov_rigid_identity, 1};
+    ovoid_status status = OVOID_OK;
+    ovoid_context *const context = fitter->context;
+    const ov_found *const start = fitter->start.count > 0 ? &fitter->start : NULL;
+    OV_TRY(need_all(fitter));
+    if (!start && ov_parts_wanted(options, fitter->atoms))
+        return ov_parts_reach(context, fitter->xyzr, fitter->atoms, &alone, options, began, ranks,
+                              found, result);
+    if (!fitter->adaptive)
+        OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, NULL, !fitter->once,
+                                  &fitter->adaptive));
+    status = ov_adaptive_reach(fitter->adaptive, options, start, began, found, result);
+cleanup:
+    return status;
+}
+
 static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *options,
                                  double began, ov_ranks *ranks, ovoid_ellipsoid **ellipsoids,
                                  uint32_t **owner, ovoid_fit_result *result) {
@@ -156,15 +285,9 @@ static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *
     ovoid_context *const context = fitter->context;
     ov_found found = {0};
     OV_TRY(ov_adaptive_check(context, &options->adaptive, fitter->atoms));
-    const bool in_parts = fitter->start.count == 0 && ov_parts_wanted(options, fitter->atoms);
-    if (!in_parts && !fitter->adaptive)
-        OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, NULL, !fitter->once,
-                                  &fitter->adaptive));
-    status = in_parts ? ov_parts_reach(context, fitter->xyzr, fitter->atoms, options, began, ranks,
-                                       &found, result)
-                      : ov_adaptive_reach(fitter->adaptive, options,
-                                          fitter->start.count > 0 ? &fitter->start : NULL, began,
-                                          &found, result);
+    status = is_fitted_by_unit(fitter, options)
+                 ? reach_by_unit(fitter, options, began, ranks, &found, result)
+                 : reach_with_all(fitter, options, began, ranks, &found, result);
     if (found.count > 0) {
         if (hand_over(context, &found, fitter->atoms, ellipsoids, owner) != OVOID_OK) {
             status = OVOID_ERROR_MEMORY;
@@ -183,14 +306,23 @@ static uint64_t hash_start(const ov_found *start) {
     return start->count > 0 ? ov_hash(start->quadrics, start->count * sizeof *start->quadrics) : 0;
 }
 
+/* Of a symmetric assembly by its unit: all atoms may be there on some ranks alone. */
+static ovoid_status meet_ranks(const ovoid_fitter *fitter, const ovoid_fit_options *options,
+                               ov_ranks *ranks) {
+    const ov_symmetry *const symmetry = &fitter->symmetry;
+    const bool by_unit = symmetry->order > 0;
+    const uint64_t start = hash_start(&fitter->start) ^ (by_unit ? symmetry->order : 0);
+    return ov_ranks_begin(fitter->context, options, by_unit ? fitter->unit : fitter->xyzr,
+                          by_unit ? symmetry->unit_atoms : fitter->atoms, start, ranks);
+}
+
 static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, double began,
                         ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
     ov_ranks ranks = {0};
     if (options->method == OVOID_METHOD_ADAPTIVE)
-        OV_TRY(ov_ranks_begin(fitter->context, options, fitter->xyzr, fitter->atoms,
-                              hash_start(&fitter->start), &ranks));
+        OV_TRY(meet_ranks(fitter, options, &ranks));
     OV_TRY(ov_fit_options_check(fitter->context, options));
     ov_progress_fit(fitter->context, options->method);
     result->method = options->method;
@@ -344,6 +476,7 @@ ovoid_status ovoid_fitter_start_from(ovoid_context *context, ovoid_fitter *fitte
     OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
     if (model) {
         OV_TRY(check_start(fitter, model));
+        OV_TRY(need_all(fitter));
         OV_TRY(take_model(fitter, model, &found));
     }
     take_start(fitter, &found);
@@ -391,6 +524,7 @@ ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, con
     OV_NEED(context, xyz);
     OV_TRY(ov_tenant_check(context, &fitter->tenant, "fitter"));
     OV_TRY(check_coordinates(fitter, xyz));
+    OV_TRY(need_all(fitter));
     after = ov_alloc(context, 4 * fitter->atoms, sizeof *after, "atoms");
     if (!after)
         return OVOID_ERROR_MEMORY;
@@ -400,6 +534,7 @@ ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, con
     }
     OV_TRY(move_model(fitter, after, &found));
     memcpy(fitter->xyzr, after, 4 * fitter->atoms * sizeof *after);
+    ov_symmetry_destroy(&fitter->symmetry); /* the atoms may go anywhere */
     take_start(fitter, &found);
     if (fitter->adaptive)
         ov_adaptive_forget(fitter->adaptive);

@@ -38,7 +38,12 @@ void ovoid_fit_options_init(ovoid_fit_options *options, size_t size) {
                 .grow = 2.0,
                 .max_backtracks = 30,
             },
-        .parts = {.atoms = 0, .jobs = 0, .resume = 0, .checkpoint = NULL, .exchange = NULL},
+        .parts = {.atoms = 0,
+                  .jobs = 0,
+                  .resume = 0,
+                  .symmetry = OVOID_SYMMETRY_USE,
+                  .checkpoint = NULL,
+                  .exchange = NULL},
     };
     ov_sized_init(options, size, &defaults, sizeof defaults);
 }
@@ -57,6 +62,7 @@ void ovoid_fit_result_init(ovoid_fit_result *result, size_t size) {
         .counts = {OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN, OVOID_UNKNOWN,
                    OVOID_UNKNOWN, OVOID_UNKNOWN},
         .parts = OVOID_UNKNOWN,
+        .units = OVOID_UNKNOWN,
     };
     ov_sized_init(result, size, &unknown, sizeof unknown);
 }
@@ -132,6 +138,10 @@ static ovoid_status check_parts(ovoid_context *context, const ovoid_parts_option
     if (parts->resume && !parts->checkpoint)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "option parts.resume needs a checkpoint to go on from");
+    if (parts->symmetry > OVOID_SYMMETRY_IGNORE)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option parts.symmetry must be one of OVOID_SYMMETRY_...; it is %lu",
+                       (unsigned long)parts->symmetry);
     return parts->exchange ? ov_exchange_check(context, parts->exchange) : OVOID_OK;
 }
 

@@ -3,6 +3,7 @@
 #include "base/progress.h"
 #include "mesh/union.h"
 #include "model/factor.h"
+#include "neighbours/neighbours.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,6 +17,15 @@
  * lies between two sheets. */
 #define FINE 256.0
 #define NO_PIECE UINT32_MAX
+#define NO_IMAGE UINT32_MAX
+/* Terms this near to a place, angstrom, are asked which is the largest there: atoms' surfaces are
+ * within half of it. Where there are none, the nearest centre counts, within the second distance. */
+#define LARGEST_WITHIN 4.0
+#define NEAREST_WITHIN 24.0
+/* In lattice steps: an image's vertices at the seam between a unit and its image lie this near to
+ * the unit's own, which are of another lattice, and look the same way to within this cosine. */
+#define PORT 2.0
+#define PORT_COSINE 0.7
 
 /* ---- one cell -------------------------------------------------------------------------------- */
 
@@ -24,6 +34,7 @@ typedef struct sheet {
     ovoid_mesh *mesh;   /* NULL: there is none */
     float *distance;    /* of its vertices from the other one */
     uint32_t *piece_of; /* of its vertices; NO_PIECE: of no triangle in the cell */
+    bool *inside;       /* of its triangles: whether they are in the cell */
     ov_trail trail;
     ov_facets facets;
 } sheet;
@@ -34,6 +45,7 @@ static void sheet_destroy(sheet *s) {
     ovoid_mesh_destroy(&s->mesh);
     free(s->distance);
     free(s->piece_of);
+    free(s->inside);
 }
 
 typedef struct surveyor {
@@ -41,6 +53,9 @@ typedef struct surveyor {
     const ov_survey_options *options;
     const double *low, *high;
     double origin[3];
+    const ov_quadric *original;
+    size_t original_count;
+    ov_grid largest, nearest; /* the original's terms, where images have to be told apart */
     ov_marcher *marcher;
     ov_meter meter;
     sheet sheet[OV_SURVEY_SIDES];
@@ -63,7 +78,8 @@ static ovoid_status mesh_sheet(surveyor *s, const ov_quadric *quadrics, size_t c
     OV_TRY(ov_mesh_finish(s->context, made->mesh));
     made->distance = ov_alloc(s->context, made->mesh->vertices, sizeof(float), "distances");
     made->piece_of = ov_alloc(s->context, made->mesh->vertices, sizeof(uint32_t), "pieces");
-    if (!made->distance || !made->piece_of) {
+    made->inside = ov_alloc(s->context, made->mesh->triangles, sizeof(bool), "pieces");
+    if (!made->distance || !made->piece_of || !made->inside) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
@@ -91,13 +107,43 @@ static ovoid_status measure_sheet(surveyor *s, sheet *from, sheet *to) {
     return ov_vertex_distances_end(s->context, &s->meter, &from->facets, from->distance);
 }
 
+/* The image whose term is the largest at a place. NO_IMAGE far from all: ellipsoids that are felt
+ * near the unit make surfaces where others, which are not, are missing. */
+static uint32_t image_at(const surveyor *s, const double at[3]) {
+    uint32_t near[2 * OV_NEAR_MAX], largest = OV_NOBODY;
+    const size_t count = ov_grid_near(&s->largest, at, UINT32_MAX, near);
+    double most = -INFINITY;
+    for (size_t n = 0; n < count; ++n) {
+        const double value = ov_quadric_log_value(&s->original[near[n]], at);
+        if (value > most) {
+            most = value;
+            largest = near[n];
+        }
+    }
+    if (largest == OV_NOBODY)
+        largest = ov_grid_nearest(&s->nearest, s->original->centre, sizeof *s->original, at);
+    return largest == OV_NOBODY ? NO_IMAGE : s->options->image[largest];
+}
+
+static ovoid_status tell_images_apart(surveyor *s) {
+    ovoid_status status = OVOID_OK;
+    if (!s->options->image || s->original_count == 0)
+        return OVOID_OK;
+    OV_TRY(ov_grid_of(s->context, s->original->centre, sizeof *s->original, s->original_count,
+                      LARGEST_WITHIN, &s->largest));
+    OV_TRY(ov_grid_of(s->context, s->original->centre, sizeof *s->original, s->original_count,
+                      NEAREST_WITHIN, &s->nearest));
+cleanup:
+    return status;
+}
+
 static bool is_inside(const surveyor *s, const ovoid_mesh *mesh, size_t triangle) {
     double centre[3];
     bool inside = true;
     ov_mesh_centre(mesh, triangle, centre);
     for (size_t k = 0; k < 3; ++k)
         inside = inside && centre[k] >= s->low[k] && centre[k] < s->high[k];
-    return inside;
+    return inside && (!s->options->image || image_at(s, centre) == 0);
 }
 
 /* What hangs together by the triangles in the cell: what does so beyond it only may be an artefact
@@ -110,7 +156,8 @@ static size_t find_pieces(const surveyor *s, sheet *at) {
         of[v] = NO_PIECE;
     for (size_t t = 0; t < mesh->triangles; ++t) {
         const uint32_t *const corner = mesh->corners + 3 * t;
-        if (!is_inside(s, mesh, t))
+        at->inside[t] = is_inside(s, mesh, t);
+        if (!at->inside[t])
             continue;
         for (size_t i = 0; i < 3; ++i)
             if (of[corner[i]] == NO_PIECE)
@@ -125,13 +172,14 @@ static size_t find_pieces(const surveyor *s, sheet *at) {
 }
 
 static void add_contents(const surveyor *s, const sheet *at, ov_survey_side *side) {
-    const double zero[3] = {0.0, 0.0, 0.0};
+    static const double zero[3] = {0.0, 0.0, 0.0};
+    const double *const centre = s->options->image ? s->options->centre : zero;
     for (size_t t = 0; t < at->mesh->triangles; ++t) {
         ov_content content = {0.0, 0.0};
-        if (!is_inside(s, at->mesh, t))
+        if (!at->inside[t])
             continue;
         ov_survey_piece *const piece = &side->piece[at->piece_of[at->mesh->corners[3 * t]]];
-        ov_mesh_smooth_triangle(at->mesh, t, zero, &content);
+        ov_mesh_smooth_triangle(at->mesh, t, centre, &content);
         piece->area += content.area;
         piece->volume += content.volume;
     }
@@ -158,6 +206,49 @@ static ovoid_status add_seam(const surveyor *s, const double at[3], uint32_t pie
                                         side->seams + 1, sizeof *side->seam, "seams between parts");
     if (status == OVOID_OK)
         side->seam[side->seams++] = (ov_survey_seam){.key = key_of(s, at), .piece = piece};
+    return status;
+}
+
+static ovoid_status add_port(const surveyor *s, const ovoid_mesh *mesh, size_t v, uint32_t piece,
+                             uint32_t image, ov_survey_side *side) {
+    const ovoid_status status = ov_grow(s->context, &side->port, &side->port_capacity,
+                                        side->ports + 1, sizeof *side->port, "seams between units");
+    if (status != OVOID_OK)
+        return status;
+    ov_survey_port *const port = &side->port[side->ports++];
+    *port = (ov_survey_port){.image = image, .piece = piece};
+    ov_mesh_at(mesh, v, port->at);
+    memcpy(port->normal, mesh->normals + 3 * v, sizeof port->normal);
+    return OVOID_OK;
+}
+
+/* Vertices of pieces that triangles of other images have, too, once for each such image. */
+static ovoid_status add_ports(const surveyor *s, const sheet *from, ov_survey_side *side) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_mesh *const mesh = from->mesh;
+    uint32_t *const last = ov_alloc(s->context, mesh->vertices, sizeof *last, "seams");
+    if (!last)
+        return OVOID_ERROR_MEMORY;
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        const uint32_t *const corner = mesh->corners + 3 * t;
+        double centre[3];
+        bool any = false;
+        for (size_t i = 0; i < 3; ++i)
+            any = any || from->piece_of[corner[i]] != NO_PIECE;
+        if (from->inside[t] || !any)
+            continue;
+        ov_mesh_centre(mesh, t, centre);
+        const uint32_t image = image_at(s, centre);
+        for (size_t i = 0; i < 3 && image > 0 && image != NO_IMAGE; ++i) {
+            const uint32_t v = corner[i], piece = from->piece_of[v];
+            if (piece == NO_PIECE || last[v] == image)
+                continue;
+            last[v] = image;
+            OV_TRY(add_port(s, mesh, v, piece, image, side));
+        }
+    }
+cleanup:
+    free(last);
     return status;
 }
 
@@ -195,6 +286,8 @@ static ovoid_status record_sheet(surveyor *s, sheet *from, ov_survey_side *side)
         if (from->distance[v] >= s->options->least)
             OV_TRY(add_spot(s, at, from->distance[v], piece, side));
     }
+    if (s->options->image)
+        OV_TRY(add_ports(s, from, side));
 cleanup:
     return status;
 }
@@ -217,8 +310,14 @@ ovoid_status ov_survey(ovoid_context *context, const ov_survey_options *options,
                        ov_survey_cell *cell) {
     ovoid_status status = OVOID_OK;
     ov_survey_cell made = {0};
-    surveyor s = {.context = context, .options = options, .low = low, .high = high};
+    surveyor s = {.context = context,
+                  .options = options,
+                  .low = low,
+                  .high = high,
+                  .original = original,
+                  .original_count = original_count};
     middle_of(original, original_count, s.origin);
+    OV_TRY(tell_images_apart(&s));
     OV_TRY(ov_marcher_create(context, &s.marcher));
     OV_TRY(mesh_sheet(&s, original, original_count, &s.sheet[0]));
     OV_TRY(mesh_sheet(&s, model, model_count, &s.sheet[1]));
@@ -229,6 +328,8 @@ ovoid_status ov_survey(ovoid_context *context, const ov_survey_options *options,
 cleanup:
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         sheet_destroy(&s.sheet[n]);
+    ov_grid_destroy(&s.largest);
+    ov_grid_destroy(&s.nearest);
     ov_meter_destroy(&s.meter);
     ov_marcher_destroy(&s.marcher);
     if (status == OVOID_OK)
@@ -242,6 +343,7 @@ void ov_survey_cell_destroy(ov_survey_cell *cell) {
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         free(cell->side[n].piece);
         free(cell->side[n].seam);
+        free(cell->side[n].port);
         free(cell->side[n].spot);
         free(cell->side[n].spot_on);
     }
@@ -252,11 +354,12 @@ void ov_survey_cell_destroy(ov_survey_cell *cell) {
 
 /* The pieces of one side, those of all cells one after the other. */
 typedef struct joint {
-    size_t pieces, seams;
+    size_t pieces, seams, ports;
     size_t *first;   /* of each cell */
     uint32_t *whole; /* of each piece: the first one that it hangs together with */
     double *volume;  /* of each such */
     ov_survey_seam *seam;
+    ov_survey_port *port;
 } joint;
 
 static void joint_destroy(joint *j) {
@@ -264,6 +367,7 @@ static void joint_destroy(joint *j) {
     free(j->whole);
     free(j->volume);
     free(j->seam);
+    free(j->port);
 }
 
 static int by_key(const void *a, const void *b) {
@@ -278,6 +382,7 @@ static ovoid_status joint_create(ovoid_context *context, const ov_survey_cell *c
     for (size_t c = 0; c < count; ++c) {
         j->pieces += cells[c].side[n].pieces;
         j->seams += cells[c].side[n].seams;
+        j->ports += cells[c].side[n].ports;
     }
     if (j->pieces >= UINT32_MAX)
         return ov_fail(context, OVOID_ERROR_LIMIT, "a surface of %zu pieces", j->pieces);
@@ -285,15 +390,20 @@ static ovoid_status joint_create(ovoid_context *context, const ov_survey_cell *c
     j->whole = ov_alloc(context, j->pieces, sizeof *j->whole, "pieces of a surface");
     j->volume = ov_alloc(context, j->pieces, sizeof *j->volume, "pieces of a surface");
     j->seam = ov_alloc(context, j->seams, sizeof *j->seam, "seams between parts");
-    return j->first && j->whole && j->volume && j->seam ? OVOID_OK : OVOID_ERROR_MEMORY;
+    j->port = ov_alloc(context, j->ports, sizeof *j->port, "seams between units");
+    return j->first && j->whole && j->volume && j->seam && j->port ? OVOID_OK : OVOID_ERROR_MEMORY;
 }
 
 /* Pieces that have a vertex in common are parts of one. */
 static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) {
-    size_t piece = 0, seam = 0;
+    size_t piece = 0, seam = 0, port = 0;
     for (size_t c = 0; c < count; ++c) {
         const ov_survey_side *const side = &cells[c].side[n];
         j->first[c] = piece;
+        for (size_t k = 0; k < side->ports; ++k, ++port) {
+            j->port[port] = side->port[k];
+            j->port[port].piece += (uint32_t)piece;
+        }
         for (size_t k = 0; k < side->seams; ++k)
             j->seam[seam++] = (ov_survey_seam){.key = side->seam[k].key,
                                                .piece = (uint32_t)piece + side->seam[k].piece};
@@ -304,6 +414,59 @@ static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) 
     for (size_t k = 1; k < j->seams; ++k)
         if (j->seam[k].key == j->seam[k - 1].key)
             ov_unite(j->whole, j->seam[k].piece, j->seam[k - 1].piece);
+}
+
+/* Of the vertices at seams the one that is what image the port leads to has where the port is: near
+ * there and facing the same way. NULL: there is none. */
+static const ov_survey_port *find_port(const joint *j, const ov_grid *grid,
+                                       const ov_survey_port *port, const ov_rigid *back) {
+    uint32_t near[2 * OV_NEAR_MAX];
+    const double normal[3] = {port->normal[0], port->normal[1], port->normal[2]};
+    double at[3], facing[3], least = INFINITY;
+    const ov_survey_port *nearest = NULL;
+    ov_rigid_move(back, port->at, at);
+    ov_rigid_turn(back, normal, facing);
+    const size_t count = ov_grid_near(grid, at, UINT32_MAX, near);
+    for (size_t n = 0; n < count; ++n) {
+        const ov_survey_port *const other = &j->port[near[n]];
+        double cosine = 0.0, square = 0.0;
+        for (size_t k = 0; k < 3; ++k) {
+            cosine += facing[k] * other->normal[k];
+            square += (at[k] - other->at[k]) * (at[k] - other->at[k]);
+        }
+        if (cosine >= PORT_COSINE && square < least) {
+            least = square;
+            nearest = other;
+        }
+    }
+    return nearest;
+}
+
+/* Pieces that go on in an image of the unit hang together with what the unit has there. */
+static ovoid_status join_images(ovoid_context *context, const ov_survey_images *images, joint *j) {
+    ovoid_status status = OVOID_OK;
+    ov_grid grid = {0};
+    ov_rigid *const back = ov_alloc(context, images->count, sizeof *back, "seams between units");
+    if (!back)
+        return OVOID_ERROR_MEMORY;
+    for (size_t g = 0; g < images->count; ++g)
+        back[g] = ov_rigid_inverse(&images->image[g]);
+    if (j->ports > 0)
+        OV_TRY(ov_grid_of(context, j->port->at, sizeof *j->port, j->ports, PORT * images->spacing,
+                          &grid));
+    for (size_t k = 0; k < j->ports; ++k) {
+        const ov_survey_port *const port = &j->port[k];
+        const ov_survey_port *const other = find_port(j, &grid, port, &back[port->image]);
+        if (other)
+            ov_unite(j->whole, port->piece, other->piece);
+    }
+cleanup:
+    ov_grid_destroy(&grid);
+    free(back);
+    return status;
+}
+
+static void add_volumes(const ov_survey_cell *cells, size_t count, size_t n, joint *j) {
     for (size_t c = 0; c < count; ++c)
         for (size_t k = 0; k < cells[c].side[n].pieces; ++k) {
             const uint32_t whole = ov_union_first(j->whole, (uint32_t)(j->first[c] + k));
@@ -353,7 +516,7 @@ cleanup:
 }
 
 ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                            double apart, ov_survey_total *total) {
+                            const ov_survey_images *images, double apart, ov_survey_total *total) {
     ovoid_status status = OVOID_OK;
     ov_survey_total made = {0};
     size_t capacity = 0;
@@ -362,6 +525,10 @@ ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
         status = joint_create(context, cells, count, n, &j);
         if (status == OVOID_OK) {
             join(cells, count, n, &j);
+            status = images->count > 1 ? join_images(context, images, &j) : OVOID_OK;
+        }
+        if (status == OVOID_OK) {
+            add_volumes(cells, count, n, &j);
             add_side(cells, count, n, &j, &made);
             status = add_spots(context, cells, count, n, &j, &capacity, &made);
         }

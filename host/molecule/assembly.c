@@ -689,7 +689,7 @@ cleanup:
 
 /* ---- all atoms ------------------------------------------------------------------------------- */
 
-static void place(const ovoid_molecule *m, const ovoid_placement *p, double *out) {
+void ov_placement_atoms(const ovoid_molecule *m, const ovoid_placement *p, double *out) {
     const ov_part *part = &m->parts[p->part];
     for (size_t i = 0; i < part->atoms; i++, out += 4) {
         const double *in = m->xyzr + 4 * (part->index ? part->index[i] : i);
@@ -711,7 +711,7 @@ ovoid_status ov_molecule_expand(ovoid_context *context, const ovoid_molecule *mo
                        "out of memory for the assembly's %zu atoms (%.1f MB)", m->all_atoms,
                        (double)m->all_atoms * 4 * sizeof *all / 1e6);
     for (size_t i = 0; i < m->placement_count; i++)
-        place(m, &m->placements[i], all + 4 * m->placements[i].first);
+        ov_placement_atoms(m, &m->placements[i], all + 4 * m->placements[i].first);
     m->all_xyzr = all;
     return OVOID_OK;
 }

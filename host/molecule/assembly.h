@@ -56,6 +56,10 @@ struct ov_reader;
 /* Lists the assemblies in the molecule, and, where options name one, makes the molecule that. */
 ovoid_status ov_assembly_finish(struct ov_reader *reader);
 
+/* The atoms of one placement, where it takes them: four values for each. */
+void ov_placement_atoms(const ovoid_molecule *molecule, const ovoid_placement *placement,
+                        double *xyzr);
+
 /* Makes the array of all atoms of an assembly, unless it is there. */
 ovoid_status ov_molecule_expand(ovoid_context *context, const ovoid_molecule *molecule);
 

@@ -559,6 +559,48 @@ void ovoid_molecule_destroy(ovoid_molecule **molecule) {
     *molecule = NULL;
 }
 
+static ovoid_status copy_parts(ovoid_context *context, const ovoid_molecule *from,
+                               ovoid_molecule *copy) {
+    copy->placements = ov_copy(context, from->placements, from->placement_count,
+                               sizeof *copy->placements, "a molecule");
+    copy->parts = ov_alloc(context, from->part_count, sizeof *copy->parts, "a molecule");
+    if (!copy->placements || !copy->parts)
+        return OVOID_ERROR_MEMORY;
+    copy->placement_count = from->placement_count;
+    copy->all_atoms = from->all_atoms;
+    for (; copy->part_count < from->part_count; copy->part_count++) {
+        const ov_part *const part = &from->parts[copy->part_count];
+        ov_part *const made = &copy->parts[copy->part_count];
+        made->atoms = part->atoms;
+        if (!part->index)
+            continue;
+        made->index = ov_copy(context, part->index, part->atoms, sizeof *part->index, "a molecule");
+        if (!made->index)
+            return OVOID_ERROR_MEMORY;
+    }
+    return OVOID_OK;
+}
+
+ovoid_status ov_molecule_copy_atoms(ovoid_context *context, const ovoid_molecule *molecule,
+                                    ovoid_molecule **copy) {
+    ovoid_status status = OVOID_OK;
+    ovoid_molecule *made = ov_alloc(context, 1, sizeof *made, "a molecule");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    made->atoms = molecule->atoms;
+    made->xyzr =
+        ov_copy(context, molecule->xyzr, 4 * molecule->atoms, sizeof *made->xyzr, "a molecule");
+    if (!made->xyzr)
+        status = OVOID_ERROR_MEMORY;
+    else if (molecule->placement_count > 0)
+        status = copy_parts(context, molecule, made);
+    if (status == OVOID_OK)
+        *copy = made;
+    else
+        ovoid_molecule_destroy(&made);
+    return status;
+}
+
 size_t ovoid_molecule_atoms(const ovoid_molecule *molecule) {
     if (!molecule)
         return 0;

@@ -46,6 +46,10 @@ struct ovoid_molecule {
     double *all_xyzr; /* 4 * all_atoms, made when first asked for */
 };
 
+/* Where its atoms are, and of an assembly where its placements are, and nothing else of it. */
+ovoid_status ov_molecule_copy_atoms(ovoid_context *context, const ovoid_molecule *molecule,
+                                    ovoid_molecule **copy);
+
 /* When all radii are known: of a structure they come last. */
 void ov_molecule_count_zero_radii(ovoid_molecule *molecule);
 

@@ -117,12 +117,22 @@ typedef struct ovoid_exchange { /* 24 bytes */
  * across seams; no ellipsoid stands for atoms of two parts, but where seams were mended. The model
  * depends on the parts, never on how many of them are fitted side by side. What begins with a
  * model, such as the next frame of a trajectory, is fitted as a whole. */
+
+/* Assemblies (molecule.h) that motions carry into themselves, such as capsids: one unit of them is
+ * fitted among its images, and repeated. */
+typedef enum ovoid_symmetry {
+    OVOID_SYMMETRY_USE = 0, /* where there is one, and the number of ellipsoids that is asked for,
+                               if one is, can be shared out equally */
+    OVOID_SYMMETRY_IGNORE   /* the assembly is fitted as any molecule */
+} ovoid_symmetry;
+
 typedef struct ovoid_parts_options { /* 32 bytes */
     uint32_t atoms;  /* of a part at most, from OVOID_LEAST_PART_ATOMS; 0: OVOID_DEFAULT_PART_ATOMS
                         in a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */
     uint32_t jobs;   /* parts side by side, each with a thread and a queue of its own, at most
                         OVOID_MOST_JOBS; 0: 1 */
     uint32_t resume; /* not 0: goes on where the checkpoint ends, if there is one */
+    uint32_t symmetry;      /* an ovoid_symmetry: USE. A fit that begins with a model uses none */
     const char *checkpoint; /* a file that gets each part as it is done, or NULL. It may not be
                                there unless the fit resumes, and stays whatever comes of that. Of
                                several ranks, rank 0 alone reads and writes it */
@@ -200,6 +210,8 @@ typedef struct ovoid_fit_result {
     uint64_t counts[OVOID_COUNTS];  /* by ovoid_count: what the fit made of them, of l1 without
                                        sampling */
     uint64_t parts;                 /* that the molecule was cut into: 1 as a whole */
+    uint64_t units; /* of a symmetric assembly, of which one was fitted, in so many parts; the model
+                       has all of them, unit after unit. 1: all atoms were fitted */
 } ovoid_fit_result;
 
 /* Nothing known; size is sizeof *result. */

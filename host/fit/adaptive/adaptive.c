@@ -299,7 +299,7 @@ static void tell(const ov_adaptive *f, size_t count, const ov_judgement *judgeme
                  ovoid_fit_result *result) {
     result->spacing = f->spacing;
     result->points = f->samples.points.count;
-    result->parts = 1;
+    result->parts = result->units = 1;
     result->ellipsoids = count;
     result->iterations = f->steps;
     result->adaptive.solver_iterations = ov_adaptive_solver_iterations(f) - f->solver_before;
@@ -353,7 +353,8 @@ ovoid_status ov_adaptive_create(ovoid_context *context, const double *xyzr, size
                        .local = {.refiner = {.context = context}}};
     if (around) {
         f->around = *around;
-        behind = around->atoms > around->fixed_count ? around->atoms : around->fixed_count;
+        behind = around->fixed_count + around->images * f->capacity;
+        behind = around->atoms > behind ? around->atoms : behind;
     }
     f->quadrics = ov_alloc(context, f->capacity + behind, sizeof *f->quadrics, "ellipsoids");
     f->twin = ov_alloc(context, f->capacity, sizeof *f->twin, "ellipsoids");

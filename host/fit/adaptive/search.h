@@ -76,8 +76,8 @@ void ov_trial_swap(ov_trial *a, ov_trial *b);
 /* Fills f->quadrics with the trial's ellipsoids. */
 void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t);
 
-/* Puts behind the first `count` of f->quadrics what is fixed around them, and returns how many
- * there are then: a model as surfaces see it. */
+/* Puts behind the first `count` of f->quadrics what is fixed around them, and images of them, and
+ * returns how many there are then: a model as surfaces see it. */
 size_t ov_adaptive_surround(ov_adaptive *f, size_t count);
 
 /* The volume of the first `count` of f->quadrics over the original's, both among the atoms around

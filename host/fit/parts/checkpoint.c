@@ -22,11 +22,14 @@ typedef struct header {
 /* ---- of what fit ----------------------------------------------------------------------------- */
 
 static ovoid_status make_header(ovoid_context *context, const ov_parts *parts, header *made) {
-    *made = (header){.magic = MAGIC,
-                     .version = ov_hash(ovoid_version(), strlen(ovoid_version())),
-                     .input = ov_hash(parts->xyzr, 4 * parts->atoms * sizeof *parts->xyzr),
-                     .options = ov_fit_options_hash(parts->options),
-                     .parts = parts->partition.count};
+    *made =
+        (header){.magic = MAGIC,
+                 .version = ov_hash(ovoid_version(), strlen(ovoid_version())),
+                 .input = ov_hash_with(ov_hash(parts->xyzr, 4 * parts->atoms * sizeof *parts->xyzr),
+                                       parts->partition.image,
+                                       parts->partition.images * sizeof *parts->partition.image),
+                 .options = ov_fit_options_hash(parts->options),
+                 .parts = parts->partition.count};
     return ov_device_hash(context, &made->device);
 }
 

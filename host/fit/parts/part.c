@@ -84,13 +84,16 @@ ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_
     const ov_box *const box = &parts->partition.part[p].cell;
     const ovoid_fit_options *const options = parts->options;
     const bool by_tolerance = options->adaptive.goal == OVOID_GOAL_TOLERANCE;
-    const ov_survey_options wanted = {.isovalue = options->isovalue,
-                                      .spacing = options->adaptive.mesh_spacing,
-                                      .least =
-                                          by_tolerance ? options->adaptive.tolerance : INFINITY};
+    ov_survey_options wanted = {.isovalue = options->isovalue,
+                                .spacing = options->adaptive.mesh_spacing,
+                                .least = by_tolerance ? options->adaptive.tolerance : INFINITY};
     ov_scene scene = {0};
     ov_quadric *original = NULL;
     OV_TRY(ov_scene_of_cell(context, parts, p, &scene));
+    if (parts->centre) {
+        wanted.image = scene.image;
+        wanted.centre = parts->centre;
+    }
     original = ov_alloc(context, scene.atoms, sizeof *original, "atoms");
     if (!original) {
         status = OVOID_ERROR_MEMORY;

@@ -20,7 +20,8 @@ typedef struct ov_parts {
     const double *xyzr;
     size_t atoms;
     const ovoid_fit_options *options;
-    ov_ranks *ranks; /* that share it */
+    ov_ranks *ranks;      /* that share it */
+    const double *centre; /* angstrom: that the images of all lie about; NULL: there are none */
     double margin; /* angstrom: this far from the box of its centres a part's surface is judged, */
     double reach;  /* and what is this far from it counts there */
     ov_partition partition;
@@ -36,8 +37,8 @@ static inline const double *ov_part_atom(const ov_parts *parts, size_t p, size_t
 }
 
 /* Fits part p from its atoms: neighbours of earlier colours are fixed as their ellipsoids, which
- * they have got by then, the others as their atoms. `done` parts are, for whom the caller is told.
- * On errors and when it is stopped *fit stays as it is. */
+ * they have got by then, the others, and images of its own, as their atoms. `done` parts are, for
+ * whom the caller is told. On errors and when it is stopped *fit stays as it is. */
 ovoid_status ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p, size_t done,
                                ov_part_fit *fit);
 

@@ -137,8 +137,38 @@ bool ov_box_near(const ov_box *box, const double at[3], double distance) {
     return true;
 }
 
+ov_box ov_box_move(const ov_box *box, const ov_rigid *rigid) {
+    double middle[3], half[3], moved[3];
+    ov_box made;
+    for (size_t k = 0; k < 3; ++k) {
+        middle[k] = 0.5 * box->low[k] + 0.5 * box->high[k];
+        half[k] = box->high[k] - middle[k];
+    }
+    ov_rigid_move(rigid, middle, moved);
+    for (size_t k = 0; k < 3; ++k) {
+        const double *const row = rigid->rotation + 3 * k;
+        const double reach =
+            fabs(row[0]) * half[0] + fabs(row[1]) * half[1] + fabs(row[2]) * half[2];
+        made.low[k] = moved[k] - reach;
+        made.high[k] = moved[k] + reach;
+    }
+    return made;
+}
+
+bool ov_part_image_near(const ov_partition *partition, size_t p, size_t q, size_t image) {
+    const ov_box *const box = &partition->part[p].box, *const other = &partition->part[q].box;
+    if (image == 0)
+        return ov_boxes_near(box, other, partition->near);
+    const ov_box moved = ov_box_move(other, &partition->image[image]);
+    return ov_boxes_near(box, &moved, partition->near);
+}
+
 bool ov_parts_near(const ov_partition *partition, size_t p, size_t q) {
-    return ov_boxes_near(&partition->part[p].box, &partition->part[q].box, partition->near);
+    for (size_t g = 0; g < partition->images;
+         ++g) /* a box about a moved box is not that box moved */
+        if (ov_part_image_near(partition, p, q, g) || ov_part_image_near(partition, q, p, g))
+            return true;
+    return false;
 }
 
 ovoid_status ov_partition_colour(ovoid_context *context, ov_partition *made) {
@@ -162,9 +192,12 @@ ovoid_status ov_partition_colour(ovoid_context *context, ov_partition *made) {
 }
 
 ovoid_status ov_partition_create(ovoid_context *context, const double *xyzr, size_t atoms,
-                                 size_t most, double near, ov_partition *partition) {
+                                 size_t most, ov_partition *partition) {
     ovoid_status status = OVOID_OK;
-    ov_partition made = {.count = 1, .near = near};
+    ov_partition made = {.count = 1,
+                         .near = partition->near,
+                         .image = partition->image,
+                         .images = partition->images};
     made.order = ov_alloc(context, atoms, sizeof *made.order, "parts of a molecule");
     made.part = ov_alloc(context, 1, sizeof *made.part, "parts of a molecule");
     if (!made.order || !made.part) {

@@ -1,11 +1,13 @@
 /*
  * A molecule cut into parts that are fitted one by one, or side by side: each is some of its atoms,
- * and what lies about them.
+ * and what lies about them. Where the molecule is the unit of a symmetric assembly, images of all
+ * of it lie about it, too.
  */
 #ifndef OV_PARTITION_H
 #define OV_PARTITION_H
 
 #include "base/base.h"
+#include "base/rigid.h"
 
 typedef struct ov_box {
     double low[3], high[3]; /* angstrom */
@@ -13,6 +15,9 @@ typedef struct ov_box {
 
 /* Whether two boxes are no further apart than that along each axis, angstrom. */
 bool ov_boxes_near(const ov_box *a, const ov_box *b, double distance);
+
+/* A box about the moved box. */
+ov_box ov_box_move(const ov_box *box, const ov_rigid *rigid);
 
 /* Whether a point is no further from the box than that along each axis. */
 bool ov_box_near(const ov_box *box, const double at[3], double distance);
@@ -29,18 +34,25 @@ typedef struct ov_partition {
     ov_part *part;
     size_t count;
     uint32_t colours;
-    double near; /* angstrom: parts whose boxes are this near are near each other */
+    double near;           /* angstrom: parts whose boxes are this near are near each other */
+    const ov_rigid *image; /* where the molecule is there: first where it is, by the identity */
+    size_t images;         /* 1: there alone */
 } ov_partition;
 
 /* Halves the atoms (x, y, z, radius each) along the longest axis of their box until no part has
- * more than `most`. Neighbouring parts in space follow one another. */
+ * more than `most`. Neighbouring parts in space follow one another. near, image (the caller's, to
+ * outlive it) and images of *partition are given. */
 ovoid_status ov_partition_create(ovoid_context *context, const double *xyzr, size_t atoms,
-                                 size_t most, double near, ov_partition *partition);
+                                 size_t most, ov_partition *partition);
 void ov_partition_destroy(ov_partition *partition);
 
 /* Gives each part the first colour that no part before it has that is near. */
 ovoid_status ov_partition_colour(ovoid_context *context, ov_partition *partition);
 
+/* Whether an image of q is near p. */
+bool ov_part_image_near(const ov_partition *partition, size_t p, size_t q, size_t image);
+
+/* Whether any is, or one of p near q. */
 bool ov_parts_near(const ov_partition *partition, size_t p, size_t q);
 
 #endif

@@ -116,6 +116,7 @@ static void add_results(const ov_parts *parts, ovoid_fit_result *result) {
     result->distance = NAN;
     result->verdict = OVOID_VERDICT_NO_SURFACE;
     result->parts = parts->partition.count;
+    result->units = 1;
     memset(result->counts, 0, sizeof result->counts);
     for (size_t p = 0; p < parts->partition.count; ++p)
         add_result(&parts->fit[p].result, result);
@@ -263,12 +264,25 @@ static ovoid_status survey(ovoid_context *context, job *j) {
         .work = {.todo = j->todo, .task = survey_task, .commit = survey_commit, .user = j},
         .pack = survey_pack,
         .unpack = survey_unpack};
+    const ov_survey_images images = {.image = cut->image,
+                                     .count = cut->images,
+                                     .spacing = j->parts->options->adaptive.mesh_spacing};
     ov_progress_stage(context, "measure");
     OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, jobs_of(j->parts), &work));
     ov_survey_total_destroy(&j->total);
-    OV_TRY(ov_survey_join(context, j->cell, cut->count, ov_tuned.spots_apart, &j->total));
+    OV_TRY(ov_survey_join(context, j->cell, cut->count, &images, ov_tuned.spots_apart, &j->total));
 cleanup:
     return status;
+}
+
+/* Whether something may have changed in a cell with what is in the box, there or in an image. */
+static bool is_touched(const ov_partition *cut, size_t p, const ov_box *touched) {
+    for (size_t g = 0; g < cut->images; ++g) {
+        const ov_box there = g > 0 ? ov_box_move(touched, &cut->image[g]) : *touched;
+        if (ov_boxes_near(&cut->part[p].cell, &there, cut->near))
+            return true;
+    }
+    return false;
 }
 
 /* Chooses the parts in whose cells something may have changed with what is in these boxes. */
@@ -277,29 +291,89 @@ static void choose_touched(job *j, const ov_box *touched, size_t count) {
     for (size_t p = 0; p < cut->count; ++p) {
         j->todo[p] = false;
         for (size_t n = 0; n < count && !j->todo[p]; ++n)
-            j->todo[p] = ov_boxes_near(&cut->part[p].cell, &touched[n], cut->near);
+            j->todo[p] = is_touched(cut, p, &touched[n]);
     }
 }
 
-/* A part is held to the surface among what lies about it. Cavities of the model that open through a
- * neck in another part are seen by a look at all of them, and are mended then. */
-static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *result) {
+/* A model, and what is off in it. */
+typedef struct mended {
+    ov_found model;
+    ov_spot *spot;
+    size_t spots;
+    double deviation;
+} mended;
+
+static void mended_destroy(mended *m) {
+    ov_found_destroy(&m->model);
+    free(m->spot);
+    *m = (mended){0};
+}
+
+/* Copies the model as it is, with what the last survey says of it. */
+static ovoid_status keep(ovoid_context *context, const job *j, mended *kept) {
+    const ov_found *const model = &j->parts->model;
+    mended made = {.model = *model, .spots = j->total.spots, .deviation = j->total.deviation};
+    made.model.quadrics =
+        ov_copy(context, model->quadrics, model->count, sizeof *model->quadrics, "ellipsoids");
+    made.model.owner =
+        ov_copy(context, model->owner, j->parts->atoms, sizeof *model->owner, "owners");
+    made.spot = ov_copy(context, j->total.spot, made.spots, sizeof *made.spot, "spots");
+    if (!made.model.quadrics || !made.model.owner || !made.spot) {
+        mended_destroy(&made);
+        return OVOID_ERROR_MEMORY;
+    }
+    mended_destroy(kept);
+    *kept = made;
+    return OVOID_OK;
+}
+
+static bool is_better(const ov_survey_total *now, const mended *before) {
+    return now->spots < before->spots ||
+           (now->spots == before->spots && now->deviation < before->deviation);
+}
+
+/* Fits patches about what is off, and surveys what that touched. */
+static ovoid_status mend(ovoid_context *context, job *j, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_box *touched = NULL;
     size_t count = 0;
+    OV_TRY(ov_patches_mend(context, j->parts, jobs_of(j->parts), j->total.spot, j->total.spots,
+                           &touched, &count, result));
+    choose_touched(j, touched, count);
+    OV_TRY(survey(context, j));
+cleanup:
+    free(touched);
+    return status;
+}
+
+static void choose_all(job *j) {
     for (size_t p = 0; p < j->parts->partition.count; ++p)
         j->todo[p] = true;
+}
+
+/* A part is held to the surface among what lies about it. Cavities of the model that open through a
+ * neck in another part are seen by a look at all of them, and are mended then; so are seams where
+ * images of one part meet. The best that any round ended with is what comes out. */
+static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *result) {
+    ovoid_status status = OVOID_OK;
+    mended best = {0};
+    uint32_t n = 0;
+    choose_all(j);
     OV_TRY(survey(context, j));
-    for (uint32_t n = 0; n < ov_tuned.part_mends && j->total.spots > 0; ++n) {
-        free(touched);
-        touched = NULL;
-        OV_TRY(ov_patches_mend(context, j->parts, jobs_of(j->parts), j->total.spot, j->total.spots,
-                               &touched, &count, result));
-        choose_touched(j, touched, count);
+    for (; n < ov_tuned.part_mends && j->total.spots > 0; ++n) {
+        if (n == 0 || is_better(&j->total, &best))
+            OV_TRY(keep(context, j, &best));
+        OV_TRY(mend(context, j, result));
+    }
+    if (n > 0 && !is_better(&j->total, &best)) {
+        ov_found_destroy(&j->parts->model);
+        j->parts->model = best.model;
+        best.model = (ov_found){0};
+        choose_all(j);
         OV_TRY(survey(context, j));
     }
 cleanup:
-    free(touched);
+    mended_destroy(&best);
     return status;
 }
 
@@ -334,8 +408,9 @@ static ovoid_status prepare(ovoid_context *context, ov_parts *parts, job *j) {
     const double length = 1.0 / sqrt(2.0 * options->decay);
     parts->margin = surface + ov_tuned.part_margin * length;
     parts->reach = parts->margin + surface + ov_tuned.part_reach * length;
+    parts->partition.near = parts->reach + ov_tuned.part_near * length;
     OV_TRY(ov_partition_create(context, parts->xyzr, parts->atoms, most_of(options, parts->atoms),
-                               parts->reach + ov_tuned.part_near * length, &parts->partition));
+                               &parts->partition));
     const size_t count = parts->partition.count;
     OV_TRY(share_out(context, parts));
     parts->fit = ov_alloc(context, count, sizeof *parts->fit, "parts of a molecule");
@@ -376,12 +451,29 @@ static void rescue(ovoid_context *context, ov_parts *parts, ov_found *found,
         hand_over(parts, found);
 }
 
+/* Where the axes of all images meet: what no motion of the group moves, the mean of what they make
+ * of any place. */
+static void find_centre(const ov_images *images, double centre[3]) {
+    for (size_t k = 0; k < 3; ++k) {
+        centre[k] = 0.0;
+        for (size_t g = 0; g < images->count; ++g) /* of the origin they make their shifts */
+            centre[k] += images->motion[g].shift[k] / (double)images->count;
+    }
+}
+
 ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t atoms,
-                            const ovoid_fit_options *options, double began, ov_ranks *ranks,
-                            ov_found *found, ovoid_fit_result *result) {
+                            const ov_images *images, const ovoid_fit_options *options, double began,
+                            ov_ranks *ranks, ov_found *found, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ovoid_fit_options of_parts = *options; /* the points are as close as in the whole */
-    ov_parts parts = {.xyzr = xyzr, .atoms = atoms, .options = &of_parts, .ranks = ranks};
+    double centre[3];
+    find_centre(images, centre);
+    ov_parts parts = {.xyzr = xyzr,
+                      .atoms = atoms,
+                      .options = &of_parts,
+                      .ranks = ranks,
+                      .centre = images->count > 1 ? centre : NULL,
+                      .partition = {.image = images->motion, .images = images->count}};
     job j = {.parts = &parts};
     if (of_parts.spacing == 0.0)
         of_parts.spacing = ov_default_spacing(atoms, options->decay);

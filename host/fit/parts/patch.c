@@ -19,6 +19,7 @@ typedef struct patch {
     size_t ellipsoids;
     uint32_t *atom; /* those that the ellipsoids stand for */
     size_t atoms;
+    uint32_t *image; /* of each atom: in which image of the unit its ellipsoid is fitted */
     ov_part_fit fit; /* what became of the ellipsoids; count 0: they stay */
 } patch;
 
@@ -98,6 +99,7 @@ static void patches_destroy(patches *all) {
         free(all->patch[p].spot);
         free(all->patch[p].ellipsoid);
         free(all->patch[p].atom);
+        free(all->patch[p].image);
         ov_found_destroy(&all->patch[p].fit.found);
     }
     free(all->patch);
@@ -107,75 +109,148 @@ static void patches_destroy(patches *all) {
 
 /* ---- what is fitted -------------------------------------------------------------------------- */
 
-static bool is_in(const patches *all, const patch *one, const ov_quadric *quadric) {
-    return ov_spots_near(one->spot, one->spots, quadric->centre, all->reach);
+/* Marks what an image of the model has about the spots of a patch. Of an ellipsoid that is there in
+ * several images, one is fitted: the others are where it was. */
+static void choose_in_image(const patches *all, const patch *one, size_t image, ov_chosen *chosen) {
+    const ov_found *const model = &all->parts->model;
+    const ov_rigid *const motion = &all->parts->partition.image[image];
+    for (size_t i = 0; i < model->count; ++i) {
+        const double *const at = model->quadrics[i].centre;
+        double moved[3] = {at[0], at[1], at[2]};
+        if (image > 0)
+            ov_rigid_move(motion, at, moved);
+        if (!chosen[i] && ov_spots_near(one->spot, one->spots, moved, all->reach))
+            chosen[i] = (ov_chosen)(image + 1);
+    }
 }
 
 /* Marks the ellipsoids of a patch, and lists them and their atoms; place gets where in the list
  * each is. */
-static ovoid_status list_patch(ovoid_context *context, const patches *all, patch *one, bool *chosen,
-                               uint32_t *place) {
+static ovoid_status list_patch(ovoid_context *context, const patches *all, size_t p,
+                               ov_chosen *chosen, uint32_t *place) {
     const ov_found *const model = &all->parts->model;
-    for (size_t i = 0; i < model->count; ++i) {
-        chosen[i] = is_in(all, one, &model->quadrics[i]);
+    patch *const one = &all->patch[p];
+    for (size_t g = 0; g < all->cut.images; ++g)
+        if (g == 0 || ov_scene_meets(all->parts, &all->cut.part[p].box, g))
+            choose_in_image(all, one, g, chosen);
+    for (size_t i = 0; i < model->count; ++i)
         if (chosen[i])
             place[i] = (uint32_t)one->ellipsoids++;
-    }
     for (size_t a = 0; a < all->parts->atoms; ++a)
-        one->atoms += chosen[model->owner[a]];
+        one->atoms += chosen[model->owner[a]] > 0;
     one->ellipsoid = ov_alloc(context, one->ellipsoids, sizeof *one->ellipsoid, "ellipsoids");
     one->atom = ov_alloc(context, one->atoms, sizeof *one->atom, "atoms");
-    if (!one->ellipsoid || !one->atom)
+    one->image = ov_alloc(context, one->atoms, sizeof *one->image, "atoms");
+    if (!one->ellipsoid || !one->atom || !one->image)
         return OVOID_ERROR_MEMORY;
     for (size_t i = 0; i < model->count; ++i)
         if (chosen[i])
             one->ellipsoid[place[i]] = (uint32_t)i;
     for (size_t a = 0, n = 0; a < all->parts->atoms; ++a)
-        if (chosen[model->owner[a]])
+        if (chosen[model->owner[a]]) {
+            one->image[n] = chosen[model->owner[a]] - 1;
             one->atom[n++] = (uint32_t)a;
+        }
     return OVOID_OK;
 }
 
 /* The patch's ellipsoids as they are, and its atoms' owners among these. */
 static ovoid_status take_start(ovoid_context *context, const patches *all, const patch *one,
-                               const uint32_t *place, ov_found *start) {
+                               const ov_chosen *chosen, const uint32_t *place, ov_found *start) {
     const ov_found *const model = &all->parts->model;
     *start = (ov_found){.count = one->ellipsoids};
     start->quadrics = ov_alloc(context, one->ellipsoids, sizeof *start->quadrics, "ellipsoids");
     start->owner = ov_alloc(context, one->atoms, sizeof *start->owner, "owners");
     if (!start->quadrics || !start->owner)
         return OVOID_ERROR_MEMORY;
-    for (size_t i = 0; i < one->ellipsoids; ++i)
-        start->quadrics[i] = model->quadrics[one->ellipsoid[i]];
+    for (size_t n = 0; n < one->ellipsoids; ++n) {
+        const uint32_t i = one->ellipsoid[n];
+        ov_scene_place_term(all->parts, &model->quadrics[i], chosen[i] - 1, &start->quadrics[n]);
+    }
     for (size_t n = 0; n < one->atoms; ++n)
         start->owner[n] = place[model->owner[one->atom[n]]];
     return OVOID_OK;
 }
 
+/* Motions that carry what is in the box to where it is felt there: its images follow. */
+static ovoid_status list_images(ovoid_context *context, const ov_parts *parts, const ov_box *box,
+                                ov_surroundings *around, ov_rigid **list) {
+    const ov_partition *const cut = &parts->partition;
+    *list = ov_alloc(context, cut->images, sizeof **list, "images");
+    if (!*list)
+        return OVOID_ERROR_MEMORY;
+    for (size_t g = 1; g < cut->images; ++g) {
+        const ov_box there = ov_box_move(box, &cut->image[g]);
+        if (ov_boxes_near(box, &there, cut->near))
+            (*list)[around->images++] = cut->image[g];
+    }
+    around->image = *list;
+    return OVOID_OK;
+}
+
 static ovoid_status fit_patch(ovoid_context *context, const patches *all, patch *one,
-                              const bool *chosen, const ov_found *start, size_t done) {
+                              const ov_chosen *chosen, const ov_found *start, size_t done) {
     ovoid_status status = OVOID_OK;
     const ov_parts *const parts = all->parts;
     ov_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     ov_scene scene = {0};
+    ov_rigid *images = NULL;
     ov_adaptive *adaptive = NULL;
     for (size_t n = 0; n < one->atoms; ++n) {
-        const double *const atom = parts->xyzr + 4 * (size_t)one->atom[n];
+        double atom[4];
+        ov_scene_place_atom(parts, parts->xyzr + 4 * (size_t)one->atom[n], one->image[n], atom);
         grow_box(&box, atom, 0.0);
-        OV_TRY(ov_scene_add_atom(context, atom, &scene));
+        OV_TRY(ov_scene_add_atom(context, atom, 0, &scene));
     }
     OV_TRY(ov_scene_about(context, parts, &box, chosen, &scene));
     ov_surroundings around = ov_scene_surround(parts, &scene, one->atoms, &box, done);
     around.total = all->cut.count;
     around.spots = one->spot;
     around.spot_count = one->spots;
+    OV_TRY(list_images(context, parts, &box, &around, &images));
     OV_TRY(ov_adaptive_create(context, scene.xyzr, one->atoms, &around, false, &adaptive));
     OV_TRY(ov_adaptive_reach(adaptive, parts->options, start, ov_seconds(), &one->fit.found,
                              &one->fit.result));
 cleanup:
     ov_adaptive_destroy(&adaptive);
     ov_scene_destroy(&scene);
+    free(images);
     return status;
+}
+
+static uint32_t image_of_nearest(const ov_parts *parts, const patch *one, const double at[3]) {
+    double least = INFINITY;
+    uint32_t image = 0;
+    for (size_t n = 0; n < one->atoms; ++n) {
+        double atom[4];
+        ov_scene_place_atom(parts, parts->xyzr + 4 * (size_t)one->atom[n], one->image[n], atom);
+        if (distance(atom, at) < least) {
+            least = distance(atom, at);
+            image = one->image[n];
+        }
+    }
+    return image;
+}
+
+/* Takes what was fitted in images of the unit back to the unit: an ellipsoid was in the image of
+ * its atoms, or, if it stands for none, of the atom that is nearest. */
+static ovoid_status bring_home(ovoid_context *context, const patches *all, patch *one) {
+    const ov_partition *const cut = &all->parts->partition;
+    ov_found *const found = &one->fit.found;
+    uint32_t *const image = ov_alloc(context, found->count, sizeof *image, "ellipsoids");
+    if (!image)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < found->count; ++i)
+        image[i] = image_of_nearest(all->parts, one, found->quadrics[i].centre);
+    for (size_t n = one->atoms; n-- > 0;) /* the first atom has the last word */
+        image[found->owner[n]] = one->image[n];
+    for (size_t i = 0; i < found->count; ++i)
+        if (image[i] > 0) {
+            const ov_rigid back = ov_rigid_inverse(&cut->image[image[i]]);
+            ov_quadric_move(&found->quadrics[i], &back, &found->quadrics[i]);
+        }
+    free(image);
+    return OVOID_OK;
 }
 
 static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *user) {
@@ -184,18 +259,19 @@ static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *us
     patch *const one = &all->patch[p];
     const size_t count = all->parts->model.count;
     ov_found start = {0};
-    bool *const chosen = ov_alloc(context, count, sizeof *chosen, "ellipsoids");
+    ov_chosen *const chosen = ov_alloc(context, count, sizeof *chosen, "ellipsoids");
     uint32_t *const place = ov_alloc(context, count, sizeof *place, "ellipsoids");
     if (!chosen || !place) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
     ovoid_fit_result_init(&one->fit.result, sizeof one->fit.result);
-    OV_TRY(list_patch(context, all, one, chosen, place));
+    OV_TRY(list_patch(context, all, p, chosen, place));
     if (one->atoms == 0)
         goto cleanup;
-    OV_TRY(take_start(context, all, one, place, &start));
+    OV_TRY(take_start(context, all, one, chosen, place, &start));
     OV_TRY(fit_patch(context, all, one, chosen, &start, done));
+    OV_TRY(bring_home(context, all, one));
 cleanup:
     if (status == OVOID_ERROR_EMPTY)
         status = OVOID_OK; /* nothing of the surface is there */
@@ -304,7 +380,9 @@ ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t job
     ovoid_status status = OVOID_OK;
     const double length = 1.0 / sqrt(2.0 * parts->options->decay);
     patches all = {.parts = parts,
-                   .cut = {.near = 2.0 * parts->partition.near},
+                   .cut = {.near = 2.0 * parts->partition.near,
+                           .image = parts->partition.image,
+                           .images = parts->partition.images},
                    .reach = ov_tuned.patch_reach * length};
     OV_TRY(make_patches(context, spots, count, &all));
     for (uint32_t colour = 0; colour < all.cut.colours; ++colour) {

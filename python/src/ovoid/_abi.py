@@ -147,7 +147,7 @@ AdaptiveOptions = _structure(
 )
 PartsOptions = _structure(
     "ovoid_parts_options",
-    *((name, c_uint32) for name in ("atoms", "jobs", "resume")),
+    *((name, c_uint32) for name in ("atoms", "jobs", "resume", "symmetry")),
     ("checkpoint", c_char_p),
     ("exchange", c_void_p),
 )
@@ -187,6 +187,7 @@ FitResult = _structure(
     ("adaptive", AdaptiveResult),
     ("counts", c_uint64 * COUNTS),
     ("parts", c_uint64),
+    ("units", c_uint64),
 )
 MeshOptions = _structure(
     "ovoid_mesh_options",

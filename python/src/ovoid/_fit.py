@@ -62,7 +62,9 @@ class FitReport:
         Of the constrained points (Å).
     points, iterations : int
     parts : int
-        That the molecule was cut into; 1 as a whole.
+        That the molecule, or one unit of it, was cut into; 1 as a whole.
+    units : int
+        Of a symmetric assembly, of which one was fitted; 1: all atoms were.
     sample_seconds, fit_seconds : float
     rms_error, max_error : float
         Of method l1, of the field at the constrained points; else NaN.
@@ -80,6 +82,7 @@ class FitReport:
     points: int
     iterations: int
     parts: int
+    units: int
     sample_seconds: float
     fit_seconds: float
     rms_error: float
@@ -183,6 +186,7 @@ def _report(result: Any, atoms: int, stopped: bool) -> FitReport:
         points=count(result.points),
         iterations=count(result.iterations),
         parts=count(result.parts) or 1,
+        units=count(result.units) or 1,
         sample_seconds=result.sample_seconds,
         fit_seconds=result.fit_seconds,
         rms_error=result.l1.rms_error,
@@ -201,6 +205,8 @@ def settings_of(options: Any, report: FitReport) -> str:
         words.append(f"mesh-spacing {options.adaptive.mesh_spacing:.9g}")
         if report.parts > 1:
             words.append(f"parts {report.parts}")
+        if report.units > 1:
+            words.append(f"units {report.units}")
     else:
         words += [f"iterations {options.l1.iterations}", f"kernel {KERNELS[options.l1.kernel]}"]
     return ", ".join(words)

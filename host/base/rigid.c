@@ -1,0 +1,40 @@
+#include "base/rigid.h"
+
+const ov_rigid ov_rigid_identity = {.rotation = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
+
+void ov_rigid_turn(const ov_rigid *rigid, const double direction[3], double turned[3]) {
+    for (int k = 0; k < 3; ++k) {
+        const double *const row = rigid->rotation + 3 * k;
+        turned[k] = row[0] * direction[0] + row[1] * direction[1] + row[2] * direction[2];
+    }
+}
+
+void ov_rigid_move(const ov_rigid *rigid, const double at[3], double moved[3]) {
+    ov_rigid_turn(rigid, at, moved);
+    for (int k = 0; k < 3; ++k)
+        moved[k] += rigid->shift[k];
+}
+
+ov_rigid ov_rigid_inverse(const ov_rigid *rigid) {
+    ov_rigid made;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            made.rotation[3 * i + j] = rigid->rotation[3 * j + i];
+    ov_rigid_turn(&made, rigid->shift, made.shift);
+    for (int k = 0; k < 3; ++k)
+        made.shift[k] = -made.shift[k];
+    return made;
+}
+
+ov_rigid ov_rigid_after(const ov_rigid *first, const ov_rigid *second) {
+    ov_rigid made;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            made.rotation[3 * i + j] = 0.0;
+            for (int k = 0; k < 3; ++k)
+                made.rotation[3 * i + j] +=
+                    second->rotation[3 * i + k] * first->rotation[3 * k + j];
+        }
+    ov_rigid_move(second, first->shift, made.shift);
+    return made;
+}

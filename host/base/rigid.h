@@ -1,0 +1,25 @@
+/*
+ * Rigid motions: a rotation and a translation, as the placements of an assembly are.
+ */
+#ifndef OV_RIGID_H
+#define OV_RIGID_H
+
+/* x' = rotation x + shift. */
+typedef struct ov_rigid {
+    double rotation[9]; /* row by row */
+    double shift[3];    /* angstrom */
+} ov_rigid;
+
+extern const ov_rigid ov_rigid_identity;
+
+void ov_rigid_move(const ov_rigid *rigid, const double at[3], double moved[3]);
+
+/* Directions turn, and do not move. */
+void ov_rigid_turn(const ov_rigid *rigid, const double direction[3], double turned[3]);
+
+ov_rigid ov_rigid_inverse(const ov_rigid *rigid);
+
+/* First the one, then the other. */
+ov_rigid ov_rigid_after(const ov_rigid *first, const ov_rigid *second);
+
+#endif

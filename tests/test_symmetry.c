@@ -1,0 +1,269 @@
+/*
+ * Symmetric assemblies: the motions that carry one into itself (host/molecule/symmetry), and fits
+ * of one unit among its images that stand for all of them.
+ */
+#include "base/rigid.h"
+#include "molecule/symmetry.h"
+#include "support.h"
+
+#include <unistd.h>
+
+#define TOLERANCE 0.5
+
+static const double PI = 3.14159265358979323846;
+
+/* About the z axis, and along it. */
+static ov_rigid screw(double turns, double along) {
+    const double c = cos(2.0 * PI * turns), s = sin(2.0 * PI * turns);
+    return (ov_rigid){.rotation = {c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0},
+                      .shift = {0.0, 0.0, along}};
+}
+
+/* Half a turn about the x axis. */
+static const ov_rigid flip = {.rotation = {1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0}};
+
+/* A PQR file of `atoms` atoms, as dense as a protein's, in a ball about (x, y, z), with an assembly
+ * of these placements. */
+static ovoid_molecule *assembly(ovoid_context *context, size_t atoms, double x, double y, double z,
+                                const ov_rigid *placements, size_t count) {
+    char path[] = "symmetry.pqr";
+    FILE *const file = fopen(path, "w");
+    test_random random = {5};
+    ovoid_read_options options;
+    ovoid_molecule *molecule = NULL;
+    const double half = 0.5 * cbrt(10.0 * (double)atoms);
+    assert_non_null(file);
+    fprintf(file, "REMARK 350 BIOMOLECULE: 1\nREMARK 350 APPLY THE FOLLOWING TO CHAINS: A\n");
+    for (size_t p = 0; p < count; ++p)
+        for (int k = 0; k < 3; ++k) {
+            const double *const row = placements[p].rotation + 3 * k;
+            fprintf(file, "REMARK 350   BIOMT%d %3zu %13.9f %13.9f %13.9f %14.8f\n", k + 1, p + 1,
+                    row[0], row[1], row[2], placements[p].shift[k]);
+        }
+    for (size_t i = 0; i < atoms; ++i) {
+        const double at[3] = {x + random_uniform(&random, -half, half),
+                              y + random_uniform(&random, -half, half),
+                              z + random_uniform(&random, -half, half)};
+        fprintf(file, "ATOM  %5zu  C   ALA A %3zu    %8.3f %8.3f %8.3f %6.3f %6.3f\n", i + 1,
+                i / 8 + 1, at[0], at[1], at[2], 0.0, random_uniform(&random, 1.2, 1.8));
+    }
+    fclose(file);
+    ovoid_read_options_init(&options, sizeof options);
+    options.assembly = "1";
+    test_check(context, ovoid_molecule_read_with(context, path, &options, &molecule));
+    unlink(path);
+    return molecule;
+}
+
+/* ---- motions --------------------------------------------------------------------------------- */
+
+/* The motions make all atoms of the assembly, each once, of those of the unit. */
+static void expect_all_made(ovoid_context *context, const ovoid_molecule *molecule,
+                            const ov_symmetry *symmetry) {
+    const double *const all = ovoid_molecule_xyzr(molecule);
+    bool *const made = test_alloc(ovoid_molecule_atoms(molecule), sizeof *made);
+    double *unit = NULL;
+    test_check(context, ov_symmetry_unit(context, molecule, symmetry, &unit));
+    assert_int_equal(symmetry->order * symmetry->unit_atoms, ovoid_molecule_atoms(molecule));
+    for (size_t g = 0; g < symmetry->order; ++g) {
+        const double *from = unit;
+        for (size_t u = 0; u < symmetry->units; ++u)
+            for (size_t n = 0; n < symmetry->atoms[u]; ++n, from += 4) {
+                const size_t atom = symmetry->first[g * symmetry->units + u] + n;
+                double moved[3];
+                ov_rigid_move(&symmetry->motion[g], from, moved);
+                for (size_t k = 0; k < 3; ++k)
+                    expect_near(moved[k], all[4 * atom + k], 1e-5, "a coordinate");
+                assert_false(made[atom]);
+                made[atom] = true;
+            }
+    }
+    free(unit);
+    free(made);
+}
+
+static void expect_symmetry(ovoid_context *context, const ov_rigid *placements, size_t count,
+                            size_t order, size_t units) {
+    ovoid_molecule *molecule = assembly(context, 20, 30.0, 4.0, 9.0, placements, count);
+    ov_symmetry symmetry = {0};
+    test_check(context, ov_symmetry_find(context, molecule, &symmetry));
+    assert_int_equal(symmetry.order, order);
+    assert_int_equal(symmetry.units, units);
+    if (order > 0) {
+        assert_memory_equal(&symmetry.motion[0], &ov_rigid_identity, sizeof ov_rigid_identity);
+        expect_all_made(context, molecule, &symmetry);
+    }
+    ov_symmetry_destroy(&symmetry);
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void groups_are_found(void **state) {
+    ov_rigid of[12];
+    for (size_t n = 0; n < 5; ++n)
+        of[n] = screw((double)n / 5.0, 0.0);
+    expect_symmetry(*state, of, 5, 5, 1);
+    for (size_t n = 0; n < 6; ++n) { /* D3: three turns, and each of them flipped */
+        const ov_rigid turn = screw((double)(n % 3) / 3.0, 0.0);
+        of[n] = n < 3 ? turn : ov_rigid_after(&turn, &flip);
+    }
+    expect_symmetry(*state, of, 6, 6, 1);
+    expect_symmetry(*state, of, 1, 1, 1);
+}
+
+/* Placements that are no group: the unit is what is left of them when the group's are taken. */
+static void units_of_several_placements_are_found(void **state) {
+    ov_rigid of[8];
+    for (size_t n = 0; n < 8; ++n) /* two rings of four, turned against each other */
+        of[n] = screw(0.25 * (double)(n % 4) + (n < 4 ? 0.0 : 0.07), n < 4 ? 0.0 : 40.0);
+    expect_symmetry(*state, of, 8, 4, 2);
+    for (size_t n = 0; n < 5; ++n) /* a stretch of a helix: its ends differ from its middle */
+        of[n] = screw(0.28 * (double)n, 12.0 * (double)n);
+    expect_symmetry(*state, of, 5, 1, 5);
+    for (size_t n = 0; n < 4; ++n) /* a ring with a gap */
+        of[n] = screw(0.2 * (double)n, 0.0);
+    expect_symmetry(*state, of, 4, 1, 4);
+    of[0] = of[1] = ov_rigid_identity; /* the same twice is no symmetry */
+    expect_symmetry(*state, of, 2, 0, 0);
+}
+
+/* ---- fits ------------------------------------------------------------------------------------ */
+
+static ovoid_model *fit(ovoid_context *context, const ovoid_molecule *molecule,
+                        const ovoid_fit_options *options, ovoid_fit_result *result) {
+    ovoid_model *model = NULL;
+    ovoid_fit_result_init(result, sizeof *result);
+    test_check(context, ovoid_fit(context, molecule, options, &model, result));
+    return model;
+}
+
+static double deviation(ovoid_context *context, const ovoid_molecule *molecule,
+                        const ovoid_model *model) {
+    ovoid_field *original = NULL, *sparse = NULL;
+    ovoid_measure_options options;
+    ovoid_measures measures;
+    ovoid_measure_options_init(&options, sizeof options);
+    ovoid_measures_init(&measures, sizeof measures);
+    test_check(context, ovoid_field_of_molecule(context, molecule, 0.5, 1.0, &original));
+    test_check(context, ovoid_field_of_model(context, model, &sparse));
+    test_check(context, ovoid_measure(context, original, sparse, &options, &measures));
+    ovoid_field_destroy(&original);
+    ovoid_field_destroy(&sparse);
+    return measures.deviation;
+}
+
+/* Unit after unit, each where a motion takes the first. */
+static void expect_repeated(const ovoid_model *model, const ov_rigid *motions, size_t units) {
+    const ovoid_ellipsoid *const of = ovoid_model_ellipsoids(model);
+    const size_t each = ovoid_model_size(model) / units;
+    assert_int_equal(ovoid_model_size(model), each * units);
+    for (size_t n = 0; n < each * units; ++n) {
+        const ovoid_ellipsoid *const first = &of[n % each];
+        double moved[3];
+        ov_rigid_move(&motions[n / each], first->centre, moved);
+        for (size_t k = 0; k < 3; ++k) {
+            expect_near(of[n].centre[k], moved[k], 1e-6, "a centre");
+            expect_near(of[n].decay[k], first->decay[k], 1e-6 * first->decay[k], "a decay rate");
+        }
+        assert_true(of[n].amplitude == first->amplitude);
+    }
+}
+
+/* Three units that touch: the goal holds at their seams, too, as a measure of the whole has it. Its
+ * lattice lies otherwise in each unit, so that it sees a little more. */
+static void units_stand_for_all(void **state) {
+    const size_t atoms = test_size(250, 120);
+    const ov_rigid of[3] = {screw(0.0, 0.0), screw(1.0 / 3.0, 0.0), screw(2.0 / 3.0, 0.0)};
+    ovoid_molecule *molecule =
+        assembly(*state, atoms, 0.5 * cbrt(10.0 * (double)atoms) + 1.0, 0.0, 50.0, of, 3);
+    ovoid_fit_options options;
+    ovoid_fit_result result, again;
+    ovoid_fit_options_init(&options, sizeof options);
+    test_skip_simulated(*state);
+    options.parts.atoms = 64;
+    ovoid_model *model = fit(*state, molecule, &options, &result);
+    const double apart = deviation(*state, molecule, model);
+    print_message("%zu ellipsoids for %zu atoms, within %g, measured as a whole %g\n",
+                  ovoid_model_size(model), 3 * atoms, result.distance, apart);
+    assert_int_equal(result.units, 3);
+    assert_true(result.parts > 1);
+    assert_int_equal(result.ellipsoids, ovoid_model_size(model));
+    assert_true(result.reached && result.distance <= TOLERANCE);
+    assert_true(apart <= 1.3 * TOLERANCE);
+    expect_repeated(model, of, 3);
+    assert_int_equal(expect_owners(molecule, model, 8, 0.9), 0);
+    options.parts.jobs = 2;
+    ovoid_model *other = fit(*state, molecule, &options, &again);
+    assert_int_equal(ovoid_model_size(other), ovoid_model_size(model));
+    assert_memory_equal(ovoid_model_ellipsoids(other), ovoid_model_ellipsoids(model),
+                        ovoid_model_size(model) * sizeof(ovoid_ellipsoid));
+    ovoid_model_destroy(&model);
+    ovoid_model_destroy(&other);
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void expect_units(ovoid_context *context, const ovoid_molecule *molecule,
+                         const ovoid_fit_options *options, uint64_t units, size_t ellipsoids) {
+    ovoid_fit_result result;
+    ovoid_model *model = fit(context, molecule, options, &result);
+    assert_int_equal(result.units, units);
+    assert_int_equal(ovoid_model_size(model), ellipsoids);
+    assert_true(result.reached);
+    ovoid_model_destroy(&model);
+}
+
+/* So many as are asked for: by unit where that goes, else by all atoms. */
+static void numbers_are_those_asked_for(void **state) {
+    const ov_rigid of[2] = {screw(0.0, 0.0), screw(0.5, 0.0)};
+    ovoid_molecule *molecule = assembly(*state, 100, 8.0, 0.0, 0.0, of, 2);
+    ovoid_fit_options options;
+    ovoid_model *none = NULL;
+    ovoid_fit_options_init(&options, sizeof options);
+    test_skip_simulated(*state);
+    options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+    options.adaptive.ellipsoids = 20;
+    expect_units(*state, molecule, &options, 2, 20);
+    options.adaptive.ellipsoids = 21;
+    expect_units(*state, molecule, &options, 1, 21);
+    options.adaptive.ellipsoids = 20;
+    options.parts.symmetry = OVOID_SYMMETRY_IGNORE;
+    expect_units(*state, molecule, &options, 1, 20);
+    options.parts.symmetry = OVOID_SYMMETRY_IGNORE + 1;
+    test_refused(*state, ovoid_fit(*state, molecule, &options, &none, NULL), OVOID_ERROR_ARGUMENT,
+                 "parts.symmetry must be one of");
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* A session goes on with all atoms where a model is what it begins with. */
+static void sessions_go_on_with_all_atoms(void **state) {
+    const ov_rigid of[2] = {screw(0.0, 0.0), screw(0.5, 0.0)};
+    ovoid_molecule *molecule = assembly(*state, 100, 8.0, 0.0, 0.0, of, 2);
+    ovoid_fit_options options;
+    ovoid_fit_result result;
+    ovoid_fitter *fitter = NULL;
+    ovoid_model *model = NULL, *next = NULL;
+    ovoid_fit_options_init(&options, sizeof options);
+    ovoid_fit_result_init(&result, sizeof result);
+    test_skip_simulated(*state);
+    test_check(*state, ovoid_fitter_create(*state, molecule, &options, &fitter));
+    test_check(*state, ovoid_fitter_reach(*state, fitter, &options, &model, &result));
+    assert_int_equal(result.units, 2);
+    test_check(*state, ovoid_fitter_start_from(*state, fitter, model));
+    test_check(*state, ovoid_fitter_reach(*state, fitter, &options, &next, &result));
+    assert_int_equal(result.units, 1);
+    assert_true(result.reached);
+    ovoid_fitter_destroy(&fitter);
+    ovoid_model_destroy(&model);
+    ovoid_model_destroy(&next);
+    ovoid_molecule_destroy(&molecule);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(groups_are_found),
+        cmocka_unit_test(units_of_several_placements_are_found),
+        cmocka_unit_test(units_stand_for_all),
+        cmocka_unit_test(numbers_are_those_asked_for),
+        cmocka_unit_test(sessions_go_on_with_all_atoms),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -19,7 +19,8 @@
 #define NO_PIECE UINT32_MAX
 #define NO_IMAGE UINT32_MAX
 /* Terms this near to a place, angstrom, are asked which is the largest there: atoms' surfaces are
- * within half of it. Where there are none, the nearest centre counts, within the second distance. */
+ * within half of it. Where there are none, the nearest centre counts, within the second distance.
+ */
 #define LARGEST_WITHIN 4.0
 #define NEAREST_WITHIN 24.0
 /* In lattice steps: an image's vertices at the seam between a unit and its image lie this near to

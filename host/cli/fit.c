@@ -94,33 +94,42 @@ static bool check_goal(const fit_job *job) {
     return false;
 }
 
-/* Why other ranks cannot take part; NULL: they can. */
-static const char *alone_because(const fit_job *job) {
-    const ovoid_fit_options *options = &job->options;
-    const size_t atoms = ovoid_molecule_atoms(job->molecule);
-    const size_t whole = options->parts.atoms ? options->parts.atoms : OVOID_DEFAULT_WHOLE_ATOMS;
-    size_t placements;
-    if (options->method != OVOID_METHOD_ADAPTIVE)
-        return "a fit by method l1 has no parts that ranks could share";
-    if (job->session)
-        return "models of one file follow one another";
-    if (options->parts.symmetry == OVOID_SYMMETRY_USE &&
-        ovoid_molecule_placements(job->molecule, &placements) && placements > 1)
-        return "ranks share an assembly only without its symmetry (--no-symmetry)";
-    if (atoms <= whole)
-        return "a molecule of one part cannot be shared, and --part-atoms makes parts of fewer "
-               "atoms";
-    return NULL;
+/* Half the ellipsoids; of a symmetric assembly as many of each unit, while that can be. */
+static uint32_t half_of(const ovoid_fit_result *result) {
+    const uint64_t half = result->ellipsoids / 2, units = result->units;
+    return (uint32_t)(units <= half ? half / units * units : half);
 }
 
 /* Whether other ranks take part: in what is cut into parts. Says so where they cannot. */
 static bool is_shared(const fit_job *job) {
+    const ovoid_fit_options *options = &job->options;
+    const size_t atoms = ovoid_molecule_atoms(job->molecule);
+    const size_t whole = options->parts.atoms ? options->parts.atoms : OVOID_DEFAULT_WHOLE_ATOMS;
     static bool said;
-    const char *const why = ranks_count() > 1 ? alone_because(job) : NULL;
-    if (why && !said && !job->quiet)
-        cli_warning("rank 0 of %u works alone: %s", (unsigned)ranks_count(), why);
-    said = said || why;
-    return ranks_count() > 1 && !why;
+    if (ranks_count() == 1)
+        return false;
+    if (options->method == OVOID_METHOD_ADAPTIVE && atoms > whole && !job->session)
+        return true;
+    if (!said && !job->quiet)
+        cli_warning("rank 0 of %u works alone: %s", (unsigned)ranks_count(),
+                    options->method != OVOID_METHOD_ADAPTIVE
+                        ? "a fit by method l1 has no parts that ranks could share"
+                    : job->session ? "models of one file follow one another"
+                                   : "a molecule of one part cannot be shared, and --part-atoms "
+                                     "makes parts of fewer atoms");
+    said = true;
+    return false;
+}
+
+/* Ranks get atoms, and not what places them. */
+static void leave_symmetry(fit_job *job) {
+    ovoid_parts_options *const parts = &job->options.parts;
+    if (!ovoid_molecule_placements(job->molecule, NULL) || parts->symmetry != OVOID_SYMMETRY_USE)
+        return;
+    parts->symmetry = OVOID_SYMMETRY_IGNORE;
+    if (!job->quiet)
+        cli_warning("ranks share all atoms of an assembly, as with --no-symmetry; one process may "
+                    "be faster, if it is symmetric");
 }
 
 static ovoid_status reach(fit_job *job, const ovoid_fit_options *options, fit_level *now) {
@@ -134,12 +143,6 @@ static ovoid_status reach(fit_job *job, const ovoid_fit_options *options, fit_le
     if (status == OVOID_ERROR_CANCELLED && limit > 0.0 && cli_seconds() - job->fit_began >= limit)
         job->out_of_time = true; /* another rank has seen it first */
     return status;
-}
-
-/* Half the ellipsoids; of a symmetric assembly as many of each unit, while that can be. */
-static uint32_t half_of(const ovoid_fit_result *result) {
-    const uint64_t half = result->ellipsoids / 2, units = result->units;
-    return (uint32_t)(units <= half ? half / units * units : half);
 }
 
 /* The goal's model, or after it one with half the ellipsoids of the level before: that one begins
@@ -410,6 +413,8 @@ int fit_run(fit_job *job) {
     if (!ovoid_context_device(job->context) && (status = open_device(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     job->shared = is_shared(job);
+    if (job->shared)
+        leave_symmetry(job);
     if (job->shared && !ranks_open(job->asked_device, &levels))
         return levels;
     status = run_fit(job, &levels, &measured);

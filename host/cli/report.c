@@ -107,8 +107,8 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
         add_number(b, "solver_iterations", (double)result->adaptive.solver_iterations);
     if (!l1) {
         add_number(b, "parts", (double)result->parts);
-        add_number(b, "ranks", job->shared ? (double)ranks_count() : 1.0);
         add_number(b, "units", (double)result->units);
+        add_number(b, "ranks", job->shared ? (double)ranks_count() : 1.0);
     }
     if (level->measured)
         b->good = b->good && measures_report(b->object, &level->measures, &job->measuring);

@@ -20,8 +20,8 @@ typedef struct ov_parts {
     const double *xyzr;
     size_t atoms;
     const ovoid_fit_options *options;
-    ov_ranks *ranks;      /* that share it */
     const double *centre; /* angstrom: that the images of all lie about; NULL: there are none */
+    ov_ranks *ranks;      /* that share it */
     double margin; /* angstrom: this far from the box of its centres a part's surface is judged, */
     double reach;  /* and what is this far from it counts there */
     ov_partition partition;

@@ -2,7 +2,7 @@
 
 static ovoid_status put_side(ovoid_context *context, const ov_survey_side *side, ov_bytes *to) {
     ovoid_status status = OVOID_OK;
-    const uint64_t counts[] = {side->pieces, side->seams, side->spots, side->ports};
+    const uint64_t counts[] = {side->pieces, side->seams, side->ports, side->spots};
     OV_TRY(ov_bytes_put(context, to, counts, sizeof counts));
     OV_TRY(ov_bytes_put(context, to, side->piece, side->pieces * sizeof *side->piece));
     OV_TRY(ov_bytes_put(context, to, side->seam, side->seams * sizeof *side->seam));
@@ -21,14 +21,14 @@ static ovoid_status take_side(ovoid_context *context, ov_reading *from, ov_surve
     OV_TRY(
         ov_bytes_take_array(context, from, &side->piece, counts[0], sizeof *side->piece, "pieces"));
     OV_TRY(ov_bytes_take_array(context, from, &side->seam, counts[1], sizeof *side->seam, "seams"));
-    OV_TRY(ov_bytes_take_array(context, from, &side->port, counts[3], sizeof *side->port, "ports"));
-    OV_TRY(ov_bytes_take_array(context, from, &side->spot, counts[2], sizeof *side->spot, "spots"));
-    OV_TRY(ov_bytes_take_array(context, from, &side->spot_on, counts[2], sizeof *side->spot_on,
+    OV_TRY(ov_bytes_take_array(context, from, &side->port, counts[2], sizeof *side->port, "seams"));
+    OV_TRY(ov_bytes_take_array(context, from, &side->spot, counts[3], sizeof *side->spot, "spots"));
+    OV_TRY(ov_bytes_take_array(context, from, &side->spot_on, counts[3], sizeof *side->spot_on,
                                "spots"));
-    side->ports = side->port_capacity = (size_t)counts[3];
     side->pieces = (size_t)counts[0];
     side->seams = side->seam_capacity = (size_t)counts[1];
-    side->spots = side->spot_capacity = side->spot_on_capacity = (size_t)counts[2];
+    side->ports = side->port_capacity = (size_t)counts[2];
+    side->spots = side->spot_capacity = side->spot_on_capacity = (size_t)counts[3];
 cleanup:
     return status;
 }

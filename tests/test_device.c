@@ -1050,8 +1050,26 @@ static void print_warning(const char *text, void *user) {
     printf("warning: %s\n", text);
 }
 
+/* "chosen: 2, name, name" of what the selector names, or nothing. */
+static void print_chosen(ovoid_context *context, const char *selector) {
+    ov_device_entry *entries = NULL;
+    size_t count = 0, platforms = 0, chosen[64], chosen_count = 0;
+    if (ov_devices_list(context, &entries, &count, &platforms) == OVOID_OK && count < 64 &&
+        ov_device_choose(context, selector, entries, count, platforms, chosen, &chosen_count) ==
+            OVOID_OK) {
+        printf("chosen: %zu", chosen_count);
+        for (size_t n = 0; n < chosen_count; n++)
+            printf(", %s", entries[chosen[n]].info.name);
+        printf("\n");
+    }
+    free(entries);
+}
+
 /* Lists devices, opens the one asked for, and runs a kernel on it; prints what happens. */
+static int list_child(void);
 static int child(const char *selector) {
+    if (strcmp(selector, "list") == 0)
+        return list_child();
     if (!getenv("UNPREPARED"))
         ovoid_prepare_process();
     ovoid_context *context = NULL;
@@ -1067,6 +1085,8 @@ static int child(const char *selector) {
     printf("devices: %s %zu\n", ovoid_status_name(status), count);
     for (size_t i = 0; i < count; i++)
         printf("device: [%s] [%s]\n", devices[i].name, devices[i].platform);
+    if (getenv("PRINT_CHOSEN"))
+        print_chosen(context, selector);
     status = ovoid_context_open_device(context, selector);
     printf("open: %s %s\n", ovoid_status_name(status), ovoid_context_error(context));
     if (status == OVOID_OK)
@@ -1262,7 +1282,7 @@ static void test_identities(void **state) {
     (void)state;
     skip_on("Oclgrind", "it stands in for the loader");
     static const struct {
-        const char *selector, *opened; /* NULL: several */
+        const char *selector, *opened;
     } cases[] = {
         {"0001:3b:00.2", "Fake Full"},
         {"00000001:3B:00.2", "Fake Full"},
@@ -1273,10 +1293,6 @@ static void test_identities(void **state) {
         {"gpu-0123", "Fake Full"},
         {"4090,fake full", "Fake Full"},
         {" gpu , af:01.0", "Fake Screen"},
-        {"4090,af:01.0", NULL},
-        {"0,1", NULL},
-        {"all", NULL},
-        {"All", NULL},
         {"3b:00.2", ""}, /* of another domain */
         {"0001:3b:00", ""},
         {"gpu-012", ""},
@@ -1291,9 +1307,7 @@ static void test_identities(void **state) {
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         char *text = CHILD(cases[k].selector, vendors, "FAKE_ICD=gpu", "LD_LIBRARY_PATH");
         char wanted[128];
-        if (!cases[k].opened)
-            snprintf(wanted, sizeof wanted, "\"%s\" names several devices", cases[k].selector);
-        else if (cases[k].opened[0])
+        if (cases[k].opened[0])
             snprintf(wanted, sizeof wanted, "CL_OUT_OF_HOST_MEMORY (-6), device %s",
                      cases[k].opened);
         else
@@ -1301,6 +1315,73 @@ static void test_identities(void **state) {
         assert_contains(text, wanted);
         free(text);
     }
+}
+
+/* Several devices, of one platform or two: each once, in the order in which they are named, and of
+ * a kind those that can be used. */
+static void test_lists(void **state) {
+    (void)state;
+    skip_on("Oclgrind", "it stands in for the loader");
+    static const struct {
+        const char *selector, *printed;
+    } cases[] = {
+        {"4090,af:01.0", "chosen: 2, Fake Full 4090, Fake Screen\n"},
+        {"af:01.0,  4090 ", "chosen: 2, Fake Screen, Fake Full 4090\n"},
+        {"4090,screen,fake full,af:01.0", "chosen: 2, Fake Full 4090, Fake Screen\n"},
+        {"GPUs", "chosen: 1, Fake Screen\n"},
+        {"accelerators", "chosen: 1, Fake Full 4090\n"},
+        {"gpus,accelerators", "chosen: 2, Fake Screen, Fake Full 4090\n"},
+        {"4090", "chosen: 1, Fake Full 4090\n"},
+        {"fake mute,4090", "Fake Mute, has no OpenCL compiler"},
+        {"4090,fake old", "Fake Old, supports \"OpenCL 1.1\""},
+        {"4090,4711", "no OpenCL device matches \"4090,4711\""},
+    };
+    bool pocl;
+    const char *vendors = fake_vendors(&pocl);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char *text =
+            CHILD(cases[k].selector, vendors, "FAKE_ICD=gpu", "PRINT_CHOSEN=1", "LD_LIBRARY_PATH");
+        assert_contains(text, cases[k].printed);
+        free(text);
+    }
+    char *text = CHILD("All", vendors, "FAKE_ICD=gpu", "PRINT_CHOSEN=1", "LD_LIBRARY_PATH");
+    assert_contains(text, pocl ? "chosen: 3, " : "chosen: 2, ");
+    assert_contains(text, "Fake Full 4090, Fake Screen");
+    free(text);
+}
+
+/* Two devices of PoCL: a context remembers its list. */
+static int list_child(void) {
+    ovoid_context *context = NULL;
+    if (ovoid_context_create(&context) != OVOID_OK)
+        return 1;
+    ovoid_device_info *devices = NULL;
+    size_t there = 0;
+    ovoid_devices(context, sizeof *devices, &devices, &there);
+    ovoid_free(devices);
+    printf("there: %zu\nbefore: %zu\n", there, ovoid_context_device_count(context));
+    if (ovoid_context_open_device(context, "1,0") != OVOID_OK)
+        printf("%s\n", ovoid_context_error(context));
+    const size_t count = ovoid_context_device_count(context);
+    printf("after: %zu\n", count);
+    for (size_t n = 0; n < count; n++)
+        printf("index: %u\n", (unsigned)ovoid_context_device_at(context, n)->index);
+    printf("beyond: %d\n", ovoid_context_device_at(context, count) == NULL);
+    printf("own: %d\n", ovoid_context_device(context) == ovoid_context_device_at(context, 0));
+    ovoid_context_open_device(context, "0");
+    printf("then: %zu\n", ovoid_context_device_count(context));
+    ovoid_context_destroy(&context);
+    return 0;
+}
+
+static void test_remembered_list(void **state) {
+    (void)state;
+    skip_on("Oclgrind", "it stands in for the loader");
+    char *text = CHILD("list", "POCL_DEVICES=pthread pthread");
+    if (strstr(text, "there: 0\n") || strstr(text, "there: 1\n"))
+        skip();
+    assert_contains(text, "before: 0\nafter: 2\nindex: 1\nindex: 0\nbeyond: 1\nown: 1\nthen: 1");
+    free(text);
 }
 
 /* PoCL finds no device when its cache folder cannot be written. Below a regular file not even root
@@ -1406,6 +1487,8 @@ int main(int argc, char **argv) {
         cmocka_unit_test_setup(test_defective_devices, clear_environment),
         cmocka_unit_test_setup(test_silent_devices, clear_environment),
         cmocka_unit_test_setup(test_identities, clear_environment),
+        cmocka_unit_test_setup(test_lists, clear_environment),
+        cmocka_unit_test_setup(test_remembered_list, clear_environment),
         cmocka_unit_test_setup(test_pocl_cache, clear_environment),
         cmocka_unit_test_setup(test_private_folder, clear_environment),
     };

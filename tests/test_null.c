@@ -105,6 +105,8 @@ static void contexts_and_devices(void **state) {
     REFUSED(ovoid_devices, count, c, size, &devices, NULL);
     REFUSED(ovoid_context_open_device, context, NULL, "");
     ANSWERS(NULL, ovoid_context_device, NULL);
+    ANSWERS(NULL, ovoid_context_device_at, NULL, 0);
+    ANSWERS(0, ovoid_context_device_count, NULL);
     ANSWERS(0, ovoid_context_count, NULL, OVOID_COUNT_LAUNCHES);
     REFUSED(ovoid_context_profile, context, NULL, true);
     REFUSED(ovoid_selftest, context, NULL, NULL, NULL, NULL, NULL);

@@ -23,6 +23,7 @@ struct ovoid_context {
     double began;                          /* the outermost work, in ov_seconds() */
     unsigned works;                        /* public functions at work, one within the other */
     struct ov_tenant *tenants;             /* base/tenant.h */
+    struct ov_crew *crew;                  /* workers of a fit in parts (fit/parts/crew.h) */
     bool profile;                          /* devices begin with their launches counted */
     struct ov_device *device;              /* NULL until opened */
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */

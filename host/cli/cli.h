@@ -70,6 +70,15 @@ int cli_failure(const ovoid_context *context, ovoid_status status, int io);
 void cli_print_exit_codes(FILE *stream);
 void cli_print_environment(FILE *stream);
 
+/* ---- device.c ------------------------------------------------------------------------------- */
+
+/* Opens the device for work that takes one: of several that the selector names it is the first, and
+ * a warning says so unless quiet. */
+ovoid_status cli_open_device(ovoid_context *context, const char *selector, bool quiet);
+/* A line of the summary for each that was named, or for the first alone. */
+void cli_print_device(const ovoid_context *context, FILE *out);
+void cli_print_devices(const ovoid_context *context, FILE *out);
+
 /* Seconds of a monotonic clock. */
 double cli_seconds(void);
 

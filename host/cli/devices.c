@@ -3,23 +3,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NONE = -1 };
-
 void cli_devices_help(FILE *stream) {
     fputs(
         "Usage: ovoid devices [--json]\n"
         "\n"
         "Lists the OpenCL devices of all platforms, one line each. A star marks the one that\n"
-        "is used when nothing else is said: OVOID_DEVICE, else the first GPU, else the first\n"
-        "device.\n"
+        "is used when nothing else is said: OVOID_DEVICE, which may name several, else the\n"
+        "first GPU, else the first device.\n"
         "\n"
         "Options:\n"
         "  --json      print JSON for other programs, with more about each device\n"
         "  -h, --help  show this help\n"
         "\n"
         "Columns:\n"
-        "  #         what --device and OVOID_DEVICE take; so are the type, part of the name, and\n"
-        "            the PCI address or UUID that --json shows where the driver tells them\n"
+        "  #         what --device and OVOID_DEVICE take; so are the type, part of the name, the\n"
+        "            PCI address or UUID that --json shows where the driver tells them, a list\n"
+        "            such as 0,1, and all or gpus for all of them\n"
         "  type      cpu, gpu, accelerator or other\n"
         "  units     compute units: cores of a CPU, multiprocessors of a GPU\n"
         "  memory    memory of the device as its driver reports it\n"
@@ -84,7 +83,17 @@ static void print_row(row cells, const size_t *width) {
             printf("%s\n", cells[c]);
 }
 
-static int print_table(const ovoid_device_info *devices, size_t count, int chosen) {
+/* Whether a fit would take the device here: the context was opened with what it takes. */
+static bool is_chosen(const ovoid_context *context, const ovoid_device_info *device) {
+    for (size_t n = 0; n < ovoid_context_device_count(context); n++)
+        if (ovoid_context_device_at(context, n)->index == device->index)
+            return true;
+    return false;
+}
+
+static int print_table(const ovoid_context *context, const ovoid_device_info *devices,
+                       size_t count) {
+    const size_t chosen = ovoid_context_device_count(context);
     static row head = {"  #",    "type",  "name",   "platform", "driver",
                        "OpenCL", "units", "memory", "width",    "fp64"};
     row *rows = calloc(count, sizeof *rows);
@@ -94,7 +103,7 @@ static int print_table(const ovoid_device_info *devices, size_t count, int chose
         return CLI_COMPUTE;
     }
     for (size_t i = 0; i < count; i++)
-        fill_row(&devices[i], (int)i == chosen, rows[i]);
+        fill_row(&devices[i], is_chosen(context, &devices[i]), rows[i]);
     for (int c = 0; c < COLUMNS; c++) {
         width[c] = strlen(head[c]);
         for (size_t i = 0; i < count; i++)
@@ -105,8 +114,10 @@ static int print_table(const ovoid_device_info *devices, size_t count, int chose
     for (size_t i = 0; i < count; i++)
         print_row(rows[i], width);
     free(rows);
-    if (chosen != NONE)
+    if (chosen == 1)
         puts("\n* is used unless --device says otherwise.");
+    else if (chosen > 1)
+        puts("\n* are used unless --device says otherwise: the first, and by fits in parts all.");
     return CLI_OK;
 }
 
@@ -135,28 +146,23 @@ static bool add_device(cJSON *array, const ovoid_device_info *device, bool chose
            cli_json_string(json, "pci", device->pci) && cli_json_string(json, "uuid", device->uuid);
 }
 
-static int print_json(ovoid_context *context, const ovoid_device_info *devices, size_t count,
-                      int chosen) {
+static int print_json(ovoid_context *context, const ovoid_device_info *devices, size_t count) {
     ovoid_status status = OVOID_ERROR_MEMORY;
     cJSON *json = cJSON_CreateObject();
     cJSON *array = json ? cJSON_AddArrayToObject(json, "devices") : NULL;
     bool made = array != NULL;
     for (size_t i = 0; made && i < count; i++)
-        made = add_device(array, &devices[i], (int)i == chosen);
+        made = add_device(array, &devices[i], is_chosen(context, &devices[i]));
     if (made)
         status = cli_json_write(context, json, "-");
     cJSON_Delete(json);
     return status == OVOID_OK ? CLI_OK : cli_failure(context, status, CLI_OUTPUT);
 }
 
-/* Index of the device that a fit would take here: the library decides by opening it. */
-static int find_default(ovoid_context *context) {
-    if (ovoid_context_open_device(context, NULL) != OVOID_OK) {
-        if (!cli_interrupted())
-            cli_warning("%s", ovoid_context_error(context));
-        return NONE;
-    }
-    return (int)ovoid_context_device(context)->index;
+/* Which device a fit would take here the library decides by opening it. */
+static void find_default(ovoid_context *context) {
+    if (ovoid_context_open_device(context, NULL) != OVOID_OK && !cli_interrupted())
+        cli_warning("%s", ovoid_context_error(context));
 }
 
 static int list(ovoid_context *context, bool json) {
@@ -169,14 +175,15 @@ static int list(ovoid_context *context, bool json) {
     if (status != OVOID_OK)
         return cli_failure(context, status, CLI_INPUT);
     quiet = true; /* opening a device would repeat the warnings */
-    int chosen = count ? find_default(context) : NONE;
+    if (count)
+        find_default(context);
     if (cli_interrupted())
         return cli_failure(context, OVOID_ERROR_CANCELLED, CLI_INPUT);
     int code = CLI_OK;
     if (json)
-        code = print_json(context, devices, count, chosen);
+        code = print_json(context, devices, count);
     else if (count)
-        code = print_table(devices, count, chosen);
+        code = print_table(context, devices, count);
     if (!count && code == CLI_OK) {
         cli_error(
             "no OpenCL device was found\n"

@@ -384,7 +384,7 @@ static int run(export_job *job) {
     if (!job->molecule && !reading_check_model(&job->reading, job->inputs[0]))
         return CLI_USAGE;
     if (needs_device(format_of(job)))
-        status = ovoid_context_open_device(job->context, job->device);
+        status = cli_open_device(job->context, job->device, job->quiet);
     if (status != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     if ((status = write_output(job)) != OVOID_OK)

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 /* A signal ends the fit and all that it has made, the time limit the search alone. */
 static bool on_progress(const ovoid_progress *progress, void *user) {
@@ -310,6 +311,28 @@ static int write_outputs(fit_job *job) {
     return code;
 }
 
+/* Says where devices were named for nothing: once in a run. */
+static void compare_with_devices(const fit_job *job) {
+    static bool told;
+    const size_t count = ovoid_context_device_count(job->context);
+    if (told || job->quiet || count < 2 || job->levels[0].result.parts > 1)
+        return;
+    told = true;
+    cli_warning("of %zu devices the first did all the work, for %s was fitted as a whole; see "
+                "--part-atoms",
+                count, source_name(job->input));
+}
+
+/* After a failure: what is left of the work. */
+static void tell_checkpoint(const fit_job *job, ovoid_status status) {
+    const char *const path = job->options.parts.checkpoint;
+    const bool by_device = status == OVOID_ERROR_DEVICE || status == OVOID_ERROR_OPENCL ||
+                           status == OVOID_ERROR_MEMORY;
+    if (path && by_device && !cli_interrupted() && access(path, F_OK) == 0)
+        cli_error("the parts that are done are in %s: the same command with --resume goes on",
+                  path);
+}
+
 /* Says what was reached instead of the goal. */
 static int compare_with_goal(const fit_job *job) {
     const ovoid_adaptive_options *wanted = &job->options.adaptive;
@@ -350,9 +373,13 @@ int fit_run(fit_job *job) {
                   job->time_limit);
         return CLI_TIME;
     }
-    if (status != OVOID_OK)
-        return cli_failure(job->context, status, CLI_OUTPUT);
+    if (status != OVOID_OK) {
+        const int code = cli_failure(job->context, status, CLI_OUTPUT);
+        tell_checkpoint(job, status);
+        return code;
+    }
     const int written = write_outputs(job);
+    compare_with_devices(job);
     if (job->written && job->options.parts.checkpoint)
         remove(job->options.parts.checkpoint); /* it has done its part */
     if (written != CLI_OK || levels != CLI_OK || measured != CLI_OK)

@@ -49,7 +49,9 @@ static void print_running(const ovoid_fit_options *defaults, FILE *stream) {
     fputs("\nRunning:\n", stream);
     cli_option_help("--device SELECTOR",
                     "number, type (cpu, gpu) or part of the name of a device that 'ovoid devices' "
-                    "lists (default: OVOID_DEVICE, else the first GPU, else the first device)",
+                    "lists (default: OVOID_DEVICE, else the first GPU, else the first device); of "
+                    "several, as 0,1 or gpus or all, the parts of a large molecule are fitted on "
+                    "each, and all else is done on the first",
                     stream);
     snprintf(text, sizeof text,
              "adaptive, which merges the atoms' Gaussians and fits the few that are left to the "

@@ -83,8 +83,23 @@ static ovoid_status annotate_number(const fit_job *job, ovoid_model *model) {
     return annotate(job, model, "model", text);
 }
 
+/* The devices that worked on it, equal ones once: the model is the same on one of them. */
+static void print_devices(const fit_job *job, size_t level, char *text, size_t size) {
+    const bool in_parts = job->levels[level].result.parts > 1;
+    const size_t count = in_parts ? ovoid_context_device_count(job->context) : 1;
+    size_t used = 0;
+    *text = '\0';
+    for (size_t n = 0; n < count && used < size; n++) {
+        const ovoid_device_info *const device = ovoid_context_device_at(job->context, n);
+        char one[512];
+        snprintf(one, sizeof one, "%s (%s, driver %s)", device->name, device->platform,
+                 device->driver);
+        if (!strstr(text, one))
+            used += (size_t)snprintf(text + used, size - used, "%s%s", used ? ", " : "", one);
+    }
+}
+
 ovoid_status fit_annotate(const fit_job *job, size_t level) {
-    const ovoid_device_info *device = ovoid_context_device(job->context);
     ovoid_model *model = job->levels[level].model;
     char text[1024];
     snprintf(text, sizeof text, "ovoid %s", ovoid_version());
@@ -93,8 +108,7 @@ ovoid_status fit_annotate(const fit_job *job, size_t level) {
         return status;
     if (job->number && (status = annotate_number(job, model)) != OVOID_OK)
         return status;
-    snprintf(text, sizeof text, "%s (%s, driver %s)", device->name, device->platform,
-             device->driver);
+    print_devices(job, level, text, sizeof text);
     if ((status = annotate(job, model, "device", text)) != OVOID_OK)
         return status;
     print_settings(job, text, sizeof text);

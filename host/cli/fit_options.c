@@ -47,9 +47,10 @@ const cli_number fit_parts_numbers[] = {
     COUNT("part-atoms", parts.atoms, 0, UINT32_MAX,
           "fits the molecule in parts of at most so many atoms, from 64, so that memory follows a "
           "part and not the molecule; 0: in parts of 16384 where there are more than 65536"),
-    COUNT("jobs", parts.jobs, 0, OVOID_MOST_JOBS,
-          "so many parts side by side, each with a thread of its own: the model stays the same; 0: "
-          "one"),
+    COUNT(
+        "jobs", parts.jobs, 0, OVOID_MOST_JOBS,
+        "so many parts side by side on each device, each with a thread of its own: the model stays "
+        "the same; 0: one"),
 };
 const size_t fit_parts_count = sizeof fit_parts_numbers / sizeof *fit_parts_numbers;
 

@@ -181,7 +181,7 @@ void cli_print_exit_codes(FILE *stream) {
 void cli_print_environment(FILE *stream) {
     fputs(
         "Environment:\n"
-        "  OVOID_DEVICE     the device to use when --device is not given\n"
+        "  OVOID_DEVICE     the device, or list, to use when --device is not given\n"
         "  OVOID_CACHE      whether compiled kernels are kept: auto (unless the driver does so\n"
         "                   itself; the default), on or off\n"
         "  OVOID_CACHE_DIR  where they are kept, instead of $XDG_CACHE_HOME/ovoid or\n"

@@ -235,7 +235,6 @@ static ovoid_status read_inputs(measure_job *job) {
 }
 
 static void print_before(const measure_job *job) {
-    const ovoid_device_info *device = ovoid_context_device(job->context);
     const size_t size = ovoid_model_size(job->model);
     if (!job->summary)
         return;
@@ -243,8 +242,7 @@ static void print_before(const measure_job *job) {
     fprintf(job->summary, "model     %s: %zu ellipsoid%s, decay %.9g Å⁻²\n",
             source_name(job->model_path), size, size == 1 ? "" : "s",
             ovoid_model_decay(job->model));
-    fprintf(job->summary, "device    %s (%s, driver %s)\n", device->name, device->platform,
-            device->driver);
+    cli_print_device(job->context, job->summary);
     fflush(job->summary);
 }
 
@@ -373,7 +371,7 @@ static int run(measure_job *job) {
         return cli_failure(job->context, OVOID_ERROR_MEMORY, CLI_INPUT);
     if (job->rows[0].isovalue == 0.0)
         job->rows[0].isovalue = ovoid_model_isovalue(job->model);
-    if ((status = ovoid_context_open_device(job->context, job->device)) != OVOID_OK)
+    if ((status = cli_open_device(job->context, job->device, job->quiet)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     print_before(job);
     status = cli_profile_begin(&job->profile, job->context);

@@ -177,7 +177,6 @@ static bool parse(int argc, char **argv, mesh_job *job, int *code) {
 }
 
 static void print_before(const mesh_job *job) {
-    const ovoid_device_info *device = ovoid_context_device(job->context);
     if (!job->summary)
         return;
     cli_progress_erase();
@@ -189,8 +188,7 @@ static void print_before(const mesh_job *job) {
         reading_print(&job->reading, job->summary, job->input, job->source.molecule);
     if (job->source.molecule)
         fprintf(job->summary, "field     decay %.9g Å⁻²\n", job->decay);
-    fprintf(job->summary, "device    %s (%s, driver %s)\n", device->name, device->platform,
-            device->driver);
+    cli_print_device(job->context, job->summary);
     fflush(job->summary);
 }
 
@@ -249,7 +247,7 @@ static int run(mesh_job *job) {
         return CLI_USAGE;
     if (job->source.model && !job->isovalue_given)
         job->options.isovalue = ovoid_model_isovalue(job->source.model);
-    if ((status = ovoid_context_open_device(job->context, job->device)) != OVOID_OK)
+    if ((status = cli_open_device(job->context, job->device, job->quiet)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     print_before(job);
     if ((status = make_mesh(job)) != OVOID_OK)

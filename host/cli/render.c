@@ -473,7 +473,7 @@ static int run(render_job *job) {
         return cli_failure(job->context, status, CLI_OUTPUT);
     if ((status = read_inputs(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_INPUT);
-    if ((status = ovoid_context_open_device(job->context, job->device)) != OVOID_OK)
+    if ((status = cli_open_device(job->context, job->device, job->quiet)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     status = make_fields(job);
     if (status == OVOID_OK)

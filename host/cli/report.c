@@ -129,6 +129,8 @@ static void add_levels(builder *b, const fit_job *job) {
 
 static void add_device(builder *b, const ovoid_device_info *device) {
     add_string(b, "device", device->name);
+    if (!b->good)
+        return;
     builder opencl = add_object(b, "opencl");
     add_string(&opencl, "platform", device->platform);
     add_string(&opencl, "vendor", device->vendor);
@@ -136,6 +138,22 @@ static void add_device(builder *b, const ovoid_device_info *device) {
     add_string(&opencl, "version", device->opencl);
     add_number(&opencl, "compute_units", device->compute_units);
     b->good = opencl.good;
+}
+
+/* Of a list all, as the first. */
+static void add_devices(builder *b, const ovoid_context *context) {
+    const size_t count = ovoid_context_device_count(context);
+    add_device(b, ovoid_context_device(context));
+    cJSON *const devices =
+        b->good && count > 1 ? cJSON_AddArrayToObject(b->object, "devices") : NULL;
+    b->good = b->good && (devices || count < 2);
+    for (size_t n = 0; b->good && devices && n < count; n++) {
+        builder one = {cJSON_CreateObject(), true};
+        one.good = one.object && cJSON_AddItemToArray(devices, one.object);
+        if (one.good)
+            add_device(&one, ovoid_context_device_at(context, n));
+        b->good = one.good;
+    }
 }
 
 static void add_times(builder *b, const fit_job *job) {
@@ -184,7 +202,7 @@ cJSON *fit_report_make(const fit_job *job) {
     add_result(&b, job, &job->levels[0]);
     if (job->level_count > 1)
         add_levels(&b, job);
-    add_device(&b, ovoid_context_device(job->context));
+    add_devices(&b, job->context);
     add_times(&b, job);
     add_profile(&b, job);
     b.good = b.good && cli_profile_report(&job->profile, b.object);

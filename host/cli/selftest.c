@@ -196,7 +196,7 @@ static void print_head(const run *r) {
 /* ---- the command -------------------------------------------------------------------------- */
 
 static int test(run *r, const char *selector) {
-    ovoid_status status = ovoid_context_open_device(r->context, selector);
+    ovoid_status status = cli_open_device(r->context, selector, false);
     if (status != OVOID_OK)
         return cli_failure(r->context, status, CLI_INPUT);
     r->device = ovoid_context_device(r->context);

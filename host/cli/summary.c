@@ -10,12 +10,10 @@ static const char *plural(count number) {
 }
 
 void fit_summary_before(const fit_job *job) {
-    const ovoid_device_info *device = ovoid_context_device(job->context);
     if (!job->summary)
         return;
     reading_print(&job->reading, job->summary, job->input, job->molecule);
-    fprintf(job->summary, "device    %s (%s, driver %s)\n", device->name, device->platform,
-            device->driver);
+    cli_print_devices(job->context, job->summary);
     fflush(job->summary);
 }
 

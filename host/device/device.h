@@ -64,6 +64,9 @@ typedef struct ov_device {
     struct ov_profile *profile;      /* times of kernels; NULL until ovoid_context_profile() */
     unsigned char *staged;           /* copies of small writes under way; NULL before the first */
     size_t staged_bytes;
+    bool ran_out; /* a call failed because the device or driver had no memory left */
+    struct ov_device_entry *others; /* further devices of the selector's list; not opened */
+    size_t other_count;
 } ov_device;
 
 /* The short form of the self-test on the context's device: text gets what is wrong, or "". *whole:
@@ -74,12 +77,24 @@ ovoid_status ov_selftest_brief(ovoid_context *context, char text[OV_SELFTEST_TEX
 /* The context's device, opening the default one if none is open yet. */
 ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
 
-/* Opens the device of one context in another one, with a queue of its own: for a thread of its own.
- */
-ovoid_status ov_device_open_again(const ovoid_context *context, ovoid_context *another);
+/* Opens device n of the list of one context in another one, with a queue of its own: for a thread
+ * of its own. Device 0 is the one that is open. */
+ovoid_status ov_device_open_again(const ovoid_context *context, size_t n, ovoid_context *another);
 
-/* Stands for all that bits depend on besides the input: the device, its driver, the kernels. */
+/* From now on the context's list is without those for which lost holds. If device 0 is one of them,
+ * the first of the others that can be opened takes its place. */
+void ov_device_leave_out(ovoid_context *context, const bool *lost);
+
+/* Stands for all that bits depend on besides the input: the devices of the list, their drivers, the
+ * kernels. Several equal ones count as one. */
 ovoid_status ov_device_hash(ovoid_context *context, uint64_t *hash);
+
+/* The same, of device n of the list alone. */
+ovoid_status ov_device_hash_of(ovoid_context *context, size_t n, uint64_t *hash);
+
+/* Whether what failed with this status in the context was the device's doing, so that another
+ * device may well succeed. Of memory, since ran_out was last cleared. */
+bool ov_device_is_at_fault(const ovoid_context *context, ovoid_status status);
 
 /* Releases programs, queue and device; nothing happens when none is open. */
 void ov_device_close(ovoid_context *context);

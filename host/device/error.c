@@ -120,6 +120,13 @@ ovoid_status ov_cl_fail_on(ovoid_context *context, cl_int code, const char *call
 }
 
 ovoid_status ov_cl_fail(ovoid_context *context, cl_int code, const char *call, const char *kernel) {
-    const ov_device *device = context ? context->device : NULL;
+    ov_device *device = context ? context->device : NULL;
+    if (device && ov_cl_status(code) == OVOID_ERROR_MEMORY)
+        device->ran_out = true;
     return ov_cl_fail_on(context, code, call, kernel, device ? device->info.name : NULL);
+}
+
+bool ov_device_is_at_fault(const ovoid_context *context, ovoid_status status) {
+    return status == OVOID_ERROR_DEVICE || status == OVOID_ERROR_OPENCL ||
+           (status == OVOID_ERROR_MEMORY && context->device && context->device->ran_out);
 }

@@ -71,11 +71,12 @@ ovoid_status ov_devices_list(ovoid_context *context, ov_device_entry **entries, 
 /* Describes a device that the caller has found; its index is UINT32_MAX. */
 ovoid_status ov_device_describe(ovoid_context *context, cl_device_id id, ov_device_entry *entry);
 
-/* The device that the selector names, or OVOID_DEVICE, or the default one: see
- * ovoid_context_open_device(). */
+/* The devices that the selector names, or OVOID_DEVICE, or the default one: see
+ * ovoid_context_open_device(). chosen gets their places in the list, each once, and has room for
+ * all; *chosen_count is 1 or more. */
 ovoid_status ov_device_choose(ovoid_context *context, const char *selector,
                               const ov_device_entry *entries, size_t count, size_t platforms,
-                              const ov_device_entry **chosen);
+                              size_t *chosen, size_t *chosen_count);
 
 /* Fills in pci and uuid, which drivers tell in ways of their own, or leave them empty. */
 void ov_device_identify(cl_device_id id, ovoid_device_info *info);
@@ -85,6 +86,11 @@ typedef struct ov_handles {
     cl_context context;
     cl_command_queue queue;
 } ov_handles;
+
+/* What is known of a device before it is opened: what the entry says, its groups and the shape of
+ * its kernels. */
+ovoid_status ov_device_plan(ovoid_context *context, const ov_device_entry *entry,
+                            ov_device *device);
 
 /* Opens the device in the place of the one that was; handles NULL: with a queue of its own. */
 ovoid_status ov_device_open(ovoid_context *context, const ov_device_entry *entry,

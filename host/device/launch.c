@@ -133,6 +133,7 @@ ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t
     cl_int code = allocate(device, buffer, room);
     if (code != CL_SUCCESS && bytes && room > bytes)
         code = allocate(device, buffer, bytes);
+    device->ran_out = device->ran_out || (code != CL_SUCCESS && code != CL_INVALID_BUFFER_SIZE);
     if (code != CL_SUCCESS)
         return ov_fail(context,
                        code == CL_INVALID_BUFFER_SIZE ? OVOID_ERROR_LIMIT : OVOID_ERROR_MEMORY,

@@ -110,6 +110,7 @@ static void release(ov_device *device) {
     if (device->borrowed && !lost)
         clReleaseDevice(device->id);
     free(device->staged);
+    free(device->others);
     free(device);
 }
 
@@ -155,31 +156,39 @@ static cl_int retain_queue(ov_device *device, const ov_handles *handles, const c
     return code;
 }
 
-static ovoid_status make_device(ovoid_context *context, const ov_device_entry *entry,
-                                const ov_handles *handles, ov_device **made) {
-    ovoid_status status = OVOID_OK;
-    const char *name = entry->info.name;
-    ov_device *device = ov_alloc(context, 1, sizeof *device, "a device");
-    if (!device)
-        return OVOID_ERROR_MEMORY;
+ovoid_status ov_device_plan(ovoid_context *context, const ov_device_entry *entry,
+                            ov_device *device) {
     device->info = entry->info;
     device->platform = entry->platform;
     device->id = entry->id;
-    const char *call = "clGetDeviceInfo";
-    cl_int code = clGetDeviceInfo(device->id, CL_DEVICE_MAX_WORK_GROUP_SIZE,
-                                  sizeof device->max_group, &device->max_group, NULL);
-    if (code == CL_SUCCESS)
-        code = handles ? retain_queue(device, handles, &call) : create_queue(device, &call);
+    const cl_int code = clGetDeviceInfo(device->id, CL_DEVICE_MAX_WORK_GROUP_SIZE,
+                                        sizeof device->max_group, &device->max_group, NULL);
+    if (code != CL_SUCCESS)
+        return ov_cl_fail_on(context, code, "clGetDeviceInfo", NULL, entry->info.name);
+    const ovoid_status status = set_shape(context, device);
+    if (status == OVOID_OK)
+        set_groups(device);
+    return status;
+}
+
+static ovoid_status make_device(ovoid_context *context, const ov_device_entry *entry,
+                                const ov_handles *handles, ov_device **made) {
+    ovoid_status status = OVOID_OK;
+    const char *call;
+    ov_device *device = ov_alloc(context, 1, sizeof *device, "a device");
+    if (!device)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_device_plan(context, entry, device));
+    const cl_int code =
+        handles ? retain_queue(device, handles, &call) : create_queue(device, &call);
     if (code != CL_SUCCESS) {
-        status = ov_cl_fail_on(context, code, call, NULL, name);
+        status = ov_cl_fail_on(context, code, call, NULL, entry->info.name);
         goto cleanup;
     }
     if (!(device->pool = ov_pool_create(context, device->info.global_memory))) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    OV_TRY(set_shape(context, device));
-    set_groups(device);
     if (context->profile)
         OV_TRY(ov_profile_start(context, device));
     *made = device;
@@ -199,37 +208,6 @@ ovoid_status ov_device_open(ovoid_context *context, const ov_device_entry *entry
     context->device = device;
     context->close_device = ov_device_close;
     return OVOID_OK;
-}
-
-ovoid_status ov_device_open_again(const ovoid_context *context, ovoid_context *another) {
-    const ov_device *const device = context->device;
-    const ov_device_entry entry = {
-        .info = device->info, .platform = device->platform, .id = device->id};
-    const ovoid_status status = ov_device_open(another, &entry, NULL);
-    if (status == OVOID_OK)
-        another->device->trusted = device->trusted;
-    return status;
-}
-
-ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector) {
-    ovoid_status status = OVOID_OK;
-    ov_device_entry *entries = NULL;
-    const ov_device_entry *entry = NULL;
-    size_t count = 0, platforms = 0;
-    OV_NEED(context, context);
-    ov_progress_begin(context, "open");
-    OV_TRY(ov_progress_ask(context));
-    OV_TRY(ov_devices_list(context, &entries, &count, &platforms));
-    OV_TRY(ov_device_choose(context, selector, entries, count, platforms, &entry));
-    OV_TRY(ov_device_open(context, entry, NULL));
-cleanup:
-    free(entries);
-    ov_progress_end(context);
-    return status;
-}
-
-const ovoid_device_info *ovoid_context_device(const ovoid_context *context) {
-    return context && context->device ? &context->device->info : NULL;
 }
 
 /* ---- counts ------------------------------------------------------------------------------- */

@@ -123,22 +123,6 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_device_hash(ovoid_context *context, uint64_t *hash) {
-    ov_device *device;
-    ov_text text = {0};
-    ovoid_status status = ov_device_get(context, &device);
-    if (status == OVOID_OK)
-        status = ov_device_key(device, &text);
-    if (status == OVOID_OK)
-        status = ov_whole_source(&text);
-    if (status == OVOID_OK)
-        status = ov_text_append(NULL, &text, (const char *)&device->shape, sizeof device->shape);
-    if (status == OVOID_OK)
-        *hash = ov_hash(text.text, text.length);
-    free(text.text);
-    return status;
-}
-
 /* All that a binary depends on, each part with its null byte. Failing means no caching. */
 static ovoid_status binary_key(const ov_device *device, const char *options, const ov_text *source,
                                ov_text *key) {

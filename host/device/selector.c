@@ -147,12 +147,55 @@ static const ov_device_entry *select_default(const ov_device_entry *entries, siz
 
 /* ---- lists -------------------------------------------------------------------------------- */
 
-/* "0,1", "gpu, 2": *entry is the one device that all parts name, NULL where one of them names none;
- * false: they name different ones. */
-static bool select_list(const ov_device_entry *entries, size_t count, const char *selector,
-                        const ov_device_entry **entry) {
-    bool one = true;
-    *entry = NULL;
+/* What a selector names so far: places in the list of entries, each once. */
+typedef struct selection {
+    const ov_device_entry *entries;
+    size_t count;
+    size_t *chosen, chosen_count;
+} selection;
+
+static void choose(selection *s, const ov_device_entry *entry) {
+    const size_t place = (size_t)(entry - s->entries);
+    for (size_t n = 0; n < s->chosen_count; n++)
+        if (s->chosen[n] == place)
+            return;
+    s->chosen[s->chosen_count++] = place;
+}
+
+/* The types of "all", "gpus" and so on; 0: the text is none of these. */
+static cl_device_type as_types(const char *selector) {
+    if (same_text(selector, "all"))
+        return CL_DEVICE_TYPE_ALL;
+    if (same_text(selector, "cpus"))
+        return CL_DEVICE_TYPE_CPU;
+    if (same_text(selector, "gpus"))
+        return CL_DEVICE_TYPE_GPU;
+    return same_text(selector, "accelerators") ? CL_DEVICE_TYPE_ACCELERATOR : 0;
+}
+
+/* All of these types that can be used; false: there are none. */
+static bool select_types(selection *s, cl_device_type types) {
+    bool any = false;
+    for (size_t i = 0; types && i < s->count; i++) {
+        if ((s->entries[i].type & types) == 0 || s->entries[i].defect[0])
+            continue;
+        any = true;
+        choose(s, &s->entries[i]);
+    }
+    return any;
+}
+
+static bool select_part(selection *s, const char *name) {
+    if (select_types(s, as_types(name)))
+        return true;
+    const ov_device_entry *const entry = select_named(s->entries, s->count, name);
+    if (entry)
+        choose(s, entry);
+    return entry != NULL;
+}
+
+/* "0,1", "gpu, 2"; false: a part names none. */
+static bool select_list(selection *s, const char *selector) {
     for (const char *part = selector; part; part = strchr(part, ',')) {
         char name[OV_SELECTOR_SIZE];
         part += *part == ',';
@@ -161,39 +204,15 @@ static bool select_list(const ov_device_entry *entries, size_t count, const char
         snprintf(name, sizeof name, "%.*s", (int)length, part);
         while (length > 0 && length < sizeof name && name[length - 1] == ' ')
             name[--length] = '\0';
-        const ov_device_entry *const own =
-            length > 0 && length < sizeof name ? select_named(entries, count, name) : NULL;
-        one = one && own && (!*entry || *entry == own);
-        if (!own) {
-            *entry = NULL;
-            return true;
-        }
-        *entry = *entry ? *entry : own;
+        if (length == 0 || length >= sizeof name || !select_part(s, name))
+            return false;
     }
-    return one;
+    return true;
 }
 
-/* The only one of all that can be used; false: there are several. */
-static bool select_all(const ov_device_entry *entries, size_t count,
-                       const ov_device_entry **entry) {
-    size_t usable = 0;
-    *entry = NULL;
-    for (size_t i = 0; i < count; i++) {
-        if (entries[i].defect[0])
-            continue;
-        usable++;
-        *entry = &entries[i];
-    }
-    return usable <= 1;
-}
-
-/* The whole selector before its parts: names may have commas. False: it names several devices. */
-static bool select_one(const ov_device_entry *entries, size_t count, const char *selector,
-                       const ov_device_entry **entry) {
-    if (same_text(selector, "all"))
-        return select_all(entries, count, entry);
-    *entry = select_named(entries, count, selector);
-    return *entry || !strchr(selector, ',') || select_list(entries, count, selector, entry);
+/* The whole selector before its parts: names may have commas. */
+static bool select_all(selection *s, const char *selector) {
+    return select_part(s, selector) || (strchr(selector, ',') && select_list(s, selector));
 }
 
 /* ---- messages ----------------------------------------------------------------------------- */
@@ -243,21 +262,6 @@ cleanup:
     return status;
 }
 
-static ovoid_status fail_with_several(ovoid_context *context, const char *selector,
-                                      const char *origin, const ov_device_entry *entries,
-                                      size_t count) {
-    ov_text text = {0};
-    ovoid_status status = OVOID_OK;
-    OV_TRY(ov_text_print(context, &text,
-                         "\"%s\"%s names several devices, and one is used at a time: name one of",
-                         selector, origin));
-    OV_TRY(append_list(context, &text, entries, count));
-    status = ov_fail(context, OVOID_ERROR_DEVICE, "%s", text.text);
-cleanup:
-    free(text.text);
-    return status;
-}
-
 /* Once in a process: the CPU does the work, while a GPU's driver is there that is not found. */
 static void tell_hint(ovoid_context *context, const ov_device_entry *entries, size_t count) {
     static atomic_flag told = ATOMIC_FLAG_INIT;
@@ -268,9 +272,30 @@ static void tell_hint(ovoid_context *context, const ov_device_entry *entries, si
 
 /* ---- the choice --------------------------------------------------------------------------- */
 
+/* One that can be used, or the default one. */
+static bool select_any(selection *s, const char *selector) {
+    if (selector)
+        return select_all(s, selector);
+    const ov_device_entry *const entry = select_default(s->entries, s->count);
+    if (entry)
+        choose(s, entry);
+    return entry != NULL;
+}
+
+static ovoid_status check_defects(ovoid_context *context, const selection *s) {
+    for (size_t n = 0; n < s->chosen_count; n++) {
+        const ov_device_entry *const entry = &s->entries[s->chosen[n]];
+        if (entry->defect[0])
+            return ov_fail(context, OVOID_ERROR_DEVICE, "device %u, %s, %s",
+                           (unsigned)entry->info.index, entry->info.name, entry->defect);
+    }
+    return OVOID_OK;
+}
+
 ovoid_status ov_device_choose(ovoid_context *context, const char *selector,
                               const ov_device_entry *entries, size_t count, size_t platforms,
-                              const ov_device_entry **chosen) {
+                              size_t *chosen, size_t *chosen_count) {
+    selection s = {entries, count, chosen, 0};
     const char *origin = "";
     if (!selector || !*selector) {
         selector = getenv("OVOID_DEVICE");
@@ -280,18 +305,11 @@ ovoid_status ov_device_choose(ovoid_context *context, const char *selector,
         selector = NULL;
     if (!count)
         return fail_without_devices(context, platforms);
-    const ov_device_entry *entry = NULL;
-    if (!selector)
-        entry = select_default(entries, count);
-    else if (!select_one(entries, count, selector, &entry))
-        return fail_with_several(context, selector, origin, entries, count);
-    if (!entry)
+    if (!select_any(&s, selector))
         return fail_without_match(context, selector, origin, entries, count);
-    if (entry->defect[0])
-        return ov_fail(context, OVOID_ERROR_DEVICE, "device %u, %s, %s",
-                       (unsigned)entry->info.index, entry->info.name, entry->defect);
-    if (!selector && entry->info.type != OVOID_DEVICE_GPU)
+    const ovoid_status status = check_defects(context, &s);
+    if (status == OVOID_OK && !selector && entries[chosen[0]].info.type != OVOID_DEVICE_GPU)
         tell_hint(context, entries, count);
-    *chosen = entry;
-    return OVOID_OK;
+    *chosen_count = s.chosen_count;
+    return status;
 }

@@ -186,13 +186,25 @@ OVOID_API ovoid_status ovoid_devices(ovoid_context *context, size_t size,
  * address on the PCI bus ("3b:00.0", "0000:3b:00.0"), a UUID or its beginning as "GPU-01234567", or
  * part of a device or platform name in any case. NULL or "" takes the environment variable
  * OVOID_DEVICE, and without it the first GPU, else the first device. The first device whose match
- * is found is taken. A list ("0,1") and "all" are refused with OVOID_ERROR_DEVICE where they name
- * more than one device, since one is used. Replaces the device opened before; objects made on that
- * one must be gone. */
+ * is found is taken.
+ *
+ * A list ("0,1", "gpu,cpu") names several, of any platforms, each once however often it is named,
+ * and so do "all", "gpus", "cpus" and "accelerators": all that can be used. The first is opened,
+ * and does all work but that of a fit in parts (ovoid_parts_options), which opens the others, too,
+ * when it comes to them.
+ *
+ * Replaces the device, or list, opened before; objects made on that one must be gone. */
 OVOID_API ovoid_status ovoid_context_open_device(ovoid_context *context, const char *selector);
 
-/* The opened device, NULL before one is opened. */
+/* The opened device, NULL before one is opened. Valid until another one is opened, or a fit loses
+ * this one (ovoid_parts_options). */
 OVOID_API const ovoid_device_info *ovoid_context_device(const ovoid_context *context);
+
+/* How many devices the selector named, 0 before one is opened; and each of them, 0 being the opened
+ * one, NULL beyond the last. Valid as that one. */
+OVOID_API size_t ovoid_context_device_count(const ovoid_context *context);
+OVOID_API const ovoid_device_info *ovoid_context_device_at(const ovoid_context *context,
+                                                           size_t index);
 
 /* What a kernel took on the device. */
 typedef struct ovoid_kernel_time { /* 24 bytes */

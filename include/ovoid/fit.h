@@ -92,7 +92,14 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
  * were fitted before as their ellipsoids and the others as their atoms, so that the goal holds
  * across seams; no ellipsoid stands for atoms of two parts, but where seams were mended. The model
  * depends on the parts, never on how many of them are fitted side by side. What begins with a
- * model, such as the next frame of a trajectory, is fitted as a whole. */
+ * model, such as the next frame of a trajectory, is fitted as a whole.
+ *
+ * Parts are fitted on all devices that the context was opened with, each part on one that is free:
+ * the model is that of one of them alone, if name, driver and kernels' shape are the same of all.
+ * Where they are not, parts are dealt out to the devices in turn, so that the model depends on the
+ * list and not on who was faster. A device that fails, or has no memory for a part, is warned of
+ * and left out from then on, by this context, too: others take its parts. When the last one fails,
+ * the fit does, and the checkpoint has what was done. */
 
 /* Assemblies (molecule.h) that motions carry into themselves, such as capsids: one unit of them is
  * fitted among its images, and repeated. */
@@ -105,8 +112,8 @@ typedef enum ovoid_symmetry {
 typedef struct ovoid_parts_options { /* 24 bytes */
     uint32_t atoms;  /* of a part at most, from OVOID_LEAST_PART_ATOMS; 0: OVOID_DEFAULT_PART_ATOMS
                         in a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */
-    uint32_t jobs;   /* parts side by side, each with a thread and a queue of its own, at most
-                        OVOID_MOST_JOBS; 0: 1 */
+    uint32_t jobs;   /* parts side by side on each device, each with a thread and a queue of its
+                        own, at most OVOID_MOST_JOBS; 0: 1 */
     uint32_t resume; /* not 0: goes on where the checkpoint ends, if there is one */
     uint32_t symmetry;      /* an ovoid_symmetry: USE. A fit that begins with a model uses none */
     const char *checkpoint; /* a file that gets each part as it is done, or NULL. It may not be

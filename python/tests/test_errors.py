@@ -261,3 +261,31 @@ def test_garbage_during_a_call_waits(peptide):
     peptide.mesh(1.0, progress=drop)
     peptide.mesh(1.0)
     assert not fields and not context._graves
+
+
+def test_several_devices():
+    code = textwrap.dedent("""
+        import numpy as np
+        import ovoid
+
+        turn = np.arange(300.0)
+        xyz = np.stack([1.5 * np.cos(turn), 1.5 * np.sin(turn), 0.5 * turn], axis=1)
+        molecule = ovoid.Molecule(xyz, 1.5)
+        if len(ovoid.devices()) < 2:
+            raise SystemExit("one device")
+        models = []
+        for name in "0", "0,1", "1,0":
+            first = ovoid.use_device(name)
+            context = ovoid._context.default_context()
+            print(first.index, [device.index for device in context.used_devices])
+            models.append(molecule.fit(ratio=0.1, part_atoms=64))
+        print(all(np.array_equal(models[0].centres, model.centres) for model in models))
+    """)
+    environment = os.environ | {"POCL_DEVICES": "pthread pthread"}
+    ran = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=300
+    )
+    if "one device" in ran.stderr:
+        pytest.skip("PoCL makes no second device here")
+    assert ran.stderr == ""
+    assert ran.stdout == "0 [0]\n0 [0, 1]\n1 [1, 0]\nTrue\n"

@@ -4,6 +4,7 @@
 #include "device/device.h"
 #include "fit/adaptive/constants.h"
 #include "fit/parts/checkpoint.h"
+#include "fit/parts/crew.h"
 #include "fit/parts/patch.h"
 #include "fit/parts/workers.h"
 
@@ -426,6 +427,7 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
     if (of_parts.spacing == 0.0)
         of_parts.spacing = ov_default_spacing(atoms, options->decay);
     OV_TRY(prepare(context, &parts, &j));
+    OV_TRY(ov_crew_begin(context)); /* for all that follows */
     result->sample_seconds = ov_seconds() - began;
     OV_TRY(fit_all(context, &j));
     add_results(&parts, result);
@@ -436,6 +438,7 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
 cleanup:
     if (status == OVOID_ERROR_CANCELLED && parts.fit)
         rescue(context, &parts, found, result);
+    ov_crew_end(context);
     destroy(&parts, &j);
     return status;
 }

@@ -251,6 +251,16 @@ static ovoid_status bring_home(ovoid_context *context, const patches *all, patch
     return OVOID_OK;
 }
 
+/* As it was before its task, for another device to try. */
+static void forget(patch *one) {
+    free(one->ellipsoid);
+    free(one->atom);
+    free(one->image);
+    one->ellipsoid = one->atom = one->image = NULL;
+    one->ellipsoids = one->atoms = 0;
+    ov_found_destroy(&one->fit.found);
+}
+
 static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *user) {
     ovoid_status status = OVOID_OK;
     const patches *const all = user;
@@ -273,6 +283,8 @@ static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *us
 cleanup:
     if (status == OVOID_ERROR_EMPTY)
         status = OVOID_OK; /* nothing of the surface is there */
+    if (status != OVOID_OK)
+        forget(one);
     ov_found_destroy(&start);
     free(chosen);
     free(place);

@@ -2,6 +2,7 @@
 
 #include "base/progress.h"
 #include "device/device.h"
+#include "fit/parts/crew.h"
 
 #include <pthread.h>
 #include <stdlib.h>
@@ -16,22 +17,19 @@ typedef struct yard {
     pthread_mutex_t lock;
     pthread_cond_t changed; /* a part has ended, or a worker */
     ovoid_context *context; /* of the caller */
+    ov_crew *crew;
     const ov_partition *partition;
     const ov_part_work *work;
-    bool *taken; /* parts that a worker has, or had, or that are not to be worked on */
-    bool *ended; /* and of these, those with which nobody is at work any more */
+    bool *taken;    /* parts that a worker has, or had, or that are not to be worked on */
+    bool *ended;    /* and of these, those with which nobody is at work any more */
+    bool *spilt;    /* parts for which a device has had too little memory */
+    size_t *device; /* where each is to be worked on; NULL: on any device of the list */
     size_t done, working;
     ovoid_status status; /* the first that is not OVOID_OK, with its text */
     char *error;
     bool stop;             /* no part is begun any more, and those under way end */
     ovoid_progress latest; /* what a worker said last */
 } yard;
-
-typedef struct worker {
-    yard *yard;
-    ovoid_context *context;
-    pthread_t thread;
-} worker;
 
 /* ---- which part next ------------------------------------------------------------------------- */
 
@@ -43,19 +41,25 @@ static bool may_begin(const yard *y, size_t p) {
     return true;
 }
 
-/* The part with the earliest colour, and of these the first, that is free and waits for none; as
- * many as there are parts if none is. *left: whether there are any. */
-static size_t next_part(const yard *y, bool *left) {
+/* Devices that come to the same bits stand in for each other, and any device for one that is lost.
+ */
+static bool may_take(const yard *y, const ov_worker *w, size_t p) {
+    if (!w || !y->device)
+        return true;
+    const ov_crew_device *const of = y->crew->device;
+    const uint64_t wanted = of[y->device[p]].hash;
+    return of[w->device].hash == wanted || ov_crew_of(y->crew, wanted) == 0;
+}
+
+/* The part with the earliest colour, and of these the first, that is free, waits for none and may
+ * be this worker's; as many as there are parts if none is. */
+static size_t next_part(const yard *y, const ov_worker *w) {
     const ov_partition *const cut = y->partition;
     size_t next = cut->count;
-    *left = false;
-    for (size_t p = 0; p < cut->count; ++p) {
-        if (y->taken[p])
-            continue;
-        *left = true;
-        if ((next == cut->count || cut->part[p].colour < cut->part[next].colour) && may_begin(y, p))
+    for (size_t p = 0; p < cut->count; ++p)
+        if (!y->taken[p] && (next == cut->count || cut->part[p].colour < cut->part[next].colour) &&
+            may_take(y, w, p) && may_begin(y, p))
             next = p;
-    }
     return next;
 }
 
@@ -69,34 +73,62 @@ static void set_failure(yard *y, ovoid_context *context, ovoid_status status) {
     y->stop = true;
 }
 
-/* Works on part p with the yard's lock open meanwhile. */
-static void work_on(yard *y, ovoid_context *context, size_t p) {
+/* Releases what a worker has, so that its memory is there for others, with the lock open. */
+static void release(yard *y, ov_worker *w) {
+    pthread_mutex_unlock(&y->lock);
+    ov_progress_end(w->context);
+    ovoid_context_destroy(&w->context);
+    pthread_mutex_lock(&y->lock);
+}
+
+/* Whether part p, which this worker could not do, is another's now: the device failed, not the
+ * part, and there is a worker left. A part that two devices have no memory for is too large. */
+static bool give_back(yard *y, ov_worker *w, size_t p, ovoid_status status) {
+    if (!w || !ov_device_is_at_fault(w->context, status))
+        return false;
+    const bool spills = status == OVOID_ERROR_MEMORY && !w->in_company;
+    ov_crew_blame(y->crew, w, status);
+    if ((spills && y->spilt[p]) || ov_crew_left(y->crew) == 0)
+        return false;
+    y->spilt[p] |= spills;
+    if (w->dismissed)
+        release(y, w);
+    y->taken[p] = false;
+    return true;
+}
+
+/* Works on part p with the yard's lock open meanwhile. w: NULL where the caller's context works. */
+static void work_on(yard *y, ovoid_context *context, ov_worker *w, size_t p) {
     const ov_part_work *const work = y->work;
     const size_t done = y->done;
     y->taken[p] = true;
+    if (w)
+        w->in_company = ov_crew_on(y->crew, w->device) > 1;
+    context->device->ran_out = false;
     pthread_mutex_unlock(&y->lock);
     ovoid_status status = work->task(context, p, done, work->user);
     pthread_mutex_lock(&y->lock);
-    if (status == OVOID_OK && work->commit)
+    const bool made = status == OVOID_OK;
+    if (made && work->commit)
         status = work->commit(context, p, work->user);
     if (status == OVOID_OK) {
         y->ended[p] = true;
         ++y->done;
-    } else {
+    } else if (made || !give_back(y, w, p, status)) {
         set_failure(y, context, status);
     }
     pthread_cond_broadcast(&y->changed);
 }
 
-/* Works on parts until none is left, with the yard's lock. */
-static void work(yard *y, ovoid_context *context) {
-    bool left = true;
-    while (!y->stop && left) {
-        const size_t p = next_part(y, &left);
+/* Works on parts until all have ended, with the yard's lock: one that another worker has may come
+ * back. */
+static void work(yard *y, ovoid_context *context, ov_worker *w) {
+    while (!y->stop && y->done < y->partition->count && !(w && w->dismissed)) {
+        const size_t p = next_part(y, w);
         if (p < y->partition->count)
-            work_on(y, context, p);
-        else if (left)
-            pthread_cond_wait(&y->changed, &y->lock); /* for one that this one waits for */
+            work_on(y, context, w, p);
+        else
+            pthread_cond_wait(&y->changed, &y->lock);
     }
 }
 
@@ -112,28 +144,21 @@ static bool on_progress(const ovoid_progress *progress, void *user) {
 }
 
 static void *run(void *user) {
-    worker *const w = user;
+    ov_worker *const w = user;
     yard *const y = w->yard;
     ov_progress_begin(w->context, "sample");
     ov_progress_fit(w->context, OVOID_METHOD_ADAPTIVE);
     pthread_mutex_lock(&y->lock);
-    work(y, w->context);
+    work(y, w->context, w);
+    w->at_work = false;
+    if (w->context && w->dismissed)
+        release(y, w);
     --y->working;
     pthread_cond_broadcast(&y->changed);
     pthread_mutex_unlock(&y->lock);
-    ov_progress_end(w->context);
+    if (w->context)
+        ov_progress_end(w->context);
     return NULL;
-}
-
-/* A context on the same device with a queue of its own. */
-static ovoid_status hire(yard *y, worker *w) {
-    w->yard = y;
-    if (ovoid_context_create(&w->context) != OVOID_OK)
-        return ov_fail(y->context, OVOID_ERROR_MEMORY, "no memory for a worker");
-    ovoid_context_on_progress(w->context, on_progress, y);
-    const ovoid_status status = ov_device_open_again(y->context, w->context);
-    return status == OVOID_OK ? OVOID_OK
-                              : ov_fail(y->context, status, "%s", ovoid_context_error(w->context));
 }
 
 /* Tells the caller what is going on until all workers have ended, and those when it has had enough.
@@ -146,13 +171,13 @@ static void watch(yard *y) {
         until.tv_sec += until.tv_nsec / 1000000000;
         until.tv_nsec %= 1000000000;
         pthread_cond_timedwait(&y->changed, &y->lock, &until);
-        if (y->stop || !y->latest.stage)
-            continue;
         ovoid_progress told = y->latest;
         told.done = y->done;
         told.total = y->partition->count;
+        const bool over = y->stop || !told.stage;
         pthread_mutex_unlock(&y->lock);
-        const bool go_on = ov_progress_report(y->context, &told);
+        ov_crew_tell(y->crew);
+        const bool go_on = over || ov_progress_report(y->context, &told);
         pthread_mutex_lock(&y->lock);
         if (!go_on && y->status == OVOID_OK)
             set_failure(y, y->context,
@@ -160,30 +185,56 @@ static void watch(yard *y) {
     }
 }
 
-static ovoid_status work_together(yard *y, size_t jobs) {
-    ovoid_status status = OVOID_OK;
-    size_t begun = 0;
-    worker *const workers = ov_alloc(y->context, jobs, sizeof *workers, "workers");
-    if (!workers)
-        return OVOID_ERROR_MEMORY;
-    for (size_t n = 0; n < jobs; ++n)
-        OV_TRY(hire(y, &workers[n]));
+/* A thread for each worker. False: there could be none. */
+static bool begin_work(yard *y, ov_worker *w) {
+    w->yard = y;
+    w->in_company = false;
+    ovoid_context_on_progress(w->context, on_progress, y);
+    w->at_work = pthread_create(&w->thread, NULL, run, w) == 0;
+    y->working += w->at_work;
+    return w->at_work;
+}
+
+static ovoid_status work_together(yard *y, size_t jobs, size_t left) {
+    ov_crew *const crew = y->crew;
+    const ovoid_status status = ov_crew_hire(crew, jobs, y->device ? SIZE_MAX : left);
+    bool *const begun = ov_alloc(y->context, crew->workers, sizeof *begun, "workers");
+    if (status != OVOID_OK || !begun) {
+        free(begun);
+        return status != OVOID_OK ? status : OVOID_ERROR_MEMORY;
+    }
     pthread_mutex_lock(&y->lock);
-    for (; begun < jobs; ++begun, ++y->working)
-        if (pthread_create(&workers[begun].thread, NULL, run, &workers[begun]) != 0)
-            break;
-    if (begun == 0)
+    for (size_t n = 0; n < crew->workers; ++n)
+        begun[n] = crew->worker[n].context && begin_work(y, &crew->worker[n]);
+    if (y->working == 0)
         set_failure(y, y->context,
                     ov_fail(y->context, OVOID_ERROR_MEMORY, "no thread could be started"));
     watch(y);
     pthread_mutex_unlock(&y->lock);
-    for (size_t n = 0; n < begun; ++n)
-        pthread_join(workers[n].thread, NULL);
-cleanup:
-    for (size_t n = 0; n < jobs; ++n)
-        ovoid_context_destroy(&workers[n].context);
-    free(workers);
-    return status;
+    for (size_t n = 0; n < crew->workers; ++n)
+        if (begun[n])
+            pthread_join(crew->worker[n].thread, NULL);
+    free(begun);
+    ov_crew_tell(crew);
+    return OVOID_OK;
+}
+
+/* ---- where each part is worked on ------------------------------------------------------------ */
+
+/* Where devices come to different bits, parts are dealt out beforehand, those of one colour in
+ * turn, so that the outcome does not depend on who was free first. */
+static ovoid_status deal_out(yard *y) {
+    const ov_partition *const cut = y->partition;
+    y->device = ov_alloc(y->context, cut->count, sizeof *y->device, "parts of a molecule");
+    if (!y->device)
+        return OVOID_ERROR_MEMORY;
+    for (size_t p = 0; p < cut->count; ++p)
+        for (size_t q = p; q-- > 0;)
+            if (cut->part[q].colour == cut->part[p].colour) {
+                y->device[p] = (y->device[q] + 1) % y->crew->devices;
+                break;
+            }
+    return OVOID_OK;
 }
 
 /* Parts that are not to be worked on have ended. */
@@ -191,42 +242,59 @@ static ovoid_status open_yard(yard *y) {
     const size_t count = y->partition->count;
     y->taken = ov_alloc(y->context, count, sizeof *y->taken, "parts of a molecule");
     y->ended = ov_alloc(y->context, count, sizeof *y->ended, "parts of a molecule");
-    if (!y->taken || !y->ended)
+    y->spilt = ov_alloc(y->context, count, sizeof *y->spilt, "parts of a molecule");
+    if (!y->taken || !y->ended || !y->spilt)
         return OVOID_ERROR_MEMORY;
     for (size_t p = 0; p < count; ++p) {
         y->taken[p] = y->ended[p] = y->work->todo && !y->work->todo[p];
         y->done += y->ended[p];
     }
-    pthread_mutex_init(&y->lock, NULL);
-    pthread_cond_init(&y->changed, NULL);
-    return OVOID_OK;
+    return y->crew->alike ? OVOID_OK : deal_out(y);
 }
 
 static void close_yard(yard *y) {
     pthread_cond_destroy(&y->changed);
     pthread_mutex_destroy(&y->lock);
+    free(y->error);
+    free(y->taken);
+    free(y->ended);
+    free(y->spilt);
+    free(y->device);
+}
+
+/* Several devices stand by for each other, even where there is one part left to do; a molecule that
+ * is one part is the first one's. */
+static bool is_for_several(const yard *y, size_t jobs, size_t left) {
+    const ov_crew *const crew = y->crew;
+    if (crew->devices > 1)
+        return left > 0 && (crew->workers > 0 || y->partition->count > 1);
+    return jobs > 1 && left > 1;
 }
 
 ovoid_status ov_parts_work(ovoid_context *context, const ov_partition *partition, size_t jobs,
                            const ov_part_work *work_of) {
     yard y = {.context = context, .partition = partition, .work = work_of};
-    ovoid_status status = open_yard(&y);
+    const bool alone = !context->crew; /* no crew is there for longer */
+    ovoid_status status = alone ? ov_crew_begin(context) : OVOID_OK;
     if (status != OVOID_OK)
-        goto cleanup;
-    if (jobs > 1 && partition->count - y.done > 1) {
-        const size_t most = partition->count - y.done;
-        status = work_together(&y, jobs < most ? jobs : most);
+        return status;
+    y.crew = context->crew;
+    pthread_mutex_init(&y.lock, NULL);
+    pthread_cond_init(&y.changed, NULL);
+    OV_TRY(open_yard(&y));
+    const size_t left = partition->count - y.done;
+    if (is_for_several(&y, jobs, left)) {
+        OV_TRY(work_together(&y, jobs > 1 ? jobs : 1, left));
     } else {
         pthread_mutex_lock(&y.lock);
-        work(&y, context);
+        work(&y, context, NULL);
         pthread_mutex_unlock(&y.lock);
     }
-    close_yard(&y);
-    if (status == OVOID_OK && y.status != OVOID_OK)
+    if (y.status != OVOID_OK)
         status = ov_fail(context, y.status, "%s", y.error ? y.error : "");
 cleanup:
-    free(y.error);
-    free(y.taken);
-    free(y.ended);
+    close_yard(&y);
+    if (alone)
+        ov_crew_end(context);
     return status;
 }

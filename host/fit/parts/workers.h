@@ -1,7 +1,7 @@
 /*
- * Work on the parts of a molecule, one after the other or side by side: then by threads with a
- * context and a queue each, on the device of the context that fits. Which one has which part, and
- * when, changes nothing about what comes of it.
+ * Work on the parts of a molecule, one after the other or side by side: then by the workers of the
+ * context's crew, or of one for this call, each with a thread. Which one has which part, and when,
+ * changes nothing about what comes of it: where devices differ, parts are dealt out beforehand.
  */
 #ifndef OV_FIT_WORKERS_H
 #define OV_FIT_WORKERS_H
@@ -19,7 +19,10 @@ typedef struct ov_part_work {
     void *user;
 } ov_part_work;
 
-/* The first failure ends it all. The caller's progress is asked on the caller's thread alone. */
+/* `jobs` at a time on each device of the context's list. A part whose device fails is taken by a
+ * worker of another one, so that a task that failed is to have changed nothing; any other failure,
+ * and that of the last device, ends it all. The caller is asked, and told warnings, on its own
+ * thread alone. */
 ovoid_status ov_parts_work(ovoid_context *context, const ov_partition *partition, size_t jobs,
                            const ov_part_work *work);
 

@@ -334,6 +334,8 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "devices": (c_int, [_P, c_size_t, POINTER(_P), _SIZE]),
     "context_open_device": (c_int, [_P, c_char_p]),
     "context_device": (POINTER(DeviceInfo), [_P]),
+    "context_device_count": (c_size_t, [_P]),
+    "context_device_at": (POINTER(DeviceInfo), [_P, c_size_t]),
     "selftest": (
         c_int,
         [_P, POINTER(SelfTestOptions), CheckFunction, _P, POINTER(SelfTestResult)],

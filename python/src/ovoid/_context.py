@@ -200,6 +200,8 @@ class Context:
         An index (``"0"``), a type (``"cpu"``, ``"gpu"``, ``"accelerator"``), an address on the PCI
         bus, a UUID, or a part of a device's or platform's name. Default: the environment variable
         OVOID_DEVICE, else the first GPU, else the first device. It is opened when first needed.
+        Of several, as ``"0,1"``, ``"gpus"`` or ``"all"``, the parts of a large molecule are fitted
+        on each, and all else is done on the first.
 
     Notes
     -----
@@ -235,6 +237,16 @@ class Context:
         with self._lock:
             self._open_device()
             return _device(lib.context_device(self._handle).contents)
+
+    @property
+    def used_devices(self) -> list[Device]:
+        """The devices that were chosen, `device` first; one that failed in a fit is left out."""
+        with self._lock:
+            self._open_device()
+            count = lib.context_device_count(self._handle)
+            return [
+                _device(lib.context_device_at(self._handle, n).contents) for n in range(count)
+            ]
 
     def devices(self) -> list[Device]:
         """All devices of all OpenCL platforms."""
@@ -418,7 +430,7 @@ def host_context() -> Context:
 
 
 def use_device(device: str | int | None) -> Device:
-    """Opens a device for all that follows.
+    """Opens a device, or several, for all that follows.
 
     Parameters
     ----------
@@ -428,6 +440,7 @@ def use_device(device: str | int | None) -> Device:
     Returns
     -------
     Device
+        The first of them.
     """
     context = default_context()
     context._select(device)

@@ -283,8 +283,9 @@ class Fitter:
             if not made.value:
                 return None
             report = _report(result, self.atoms, stopped)
-            device = self.context.device
-            notes = {"device": f"{device.name} ({device.platform}, driver {device.driver})"}
+            used = self.context.used_devices[: None if report.parts > 1 else 1]
+            texts = [f"{one.name} ({one.platform}, driver {one.driver})" for one in used]
+            notes = {"device": ", ".join(dict.fromkeys(texts))}  # alike ones are one
             notes["settings"] = settings_of(options, report)
             if report.method == "adaptive":
                 notes["goal"] = "reached" if report.reached else "not reached"

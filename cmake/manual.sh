@@ -9,7 +9,7 @@ folder=$3
 LC_ALL=C # text is bytes, in any awk
 export LC_ALL
 mkdir -p "$folder/man1"
-version=$("$ovoid" --version | sed 's/.* //')
+version=$("$ovoid" --version | sed -n '1s/.* //p')
 commands=$("$ovoid" help | awk '/^Commands:/ { on = 1; next } /^$/ { on = 0 } on && $1 != "help" { print $1 }')
 [ -n "$commands" ] || { echo "$ovoid: no help" >&2; exit 1; }
 pages=ovoid

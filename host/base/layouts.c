@@ -47,6 +47,8 @@ PROMISED(ovoid_distances, 5 * sizeof(double));
 PROMISED(ovoid_pair, 3 * sizeof(double));
 PROMISED(ovoid_l1_options, 80);
 PROMISED(ovoid_adaptive_options, 48);
+PROMISED(ovoid_parts_options, 12 + 4 + 2 * sizeof(void *));
+PROMISED(ovoid_exchange, 8 + 2 * sizeof(void *));
 PROMISED(ovoid_l1_progress, 7 * sizeof(double));
 PROMISED(ovoid_adaptive_progress, sizeof(double));
 PROMISED(ovoid_l1_result, 72);
@@ -85,7 +87,7 @@ static const struct {
              SIZE(ovoid_atom),          SIZE(ovoid_residue),           SIZE(ovoid_guess),
              SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options),
              SIZE(ovoid_check),         SIZE(ovoid_selftest_options),  SIZE(ovoid_selftest_result),
-             SIZE(ovoid_scene),         SIZE(ovoid_parts_options)};
+             SIZE(ovoid_scene),         SIZE(ovoid_parts_options),     SIZE(ovoid_exchange)};
 #undef SIZE
 
 size_t ovoid_sizeof(const char *type) {

@@ -43,6 +43,8 @@ cli_warning(const char *format, ...);
 /* From now on errors and warnings that do not name `about` begin with it; NULL: with nothing. The
  * text must live until replaced. Forgets the last error. */
 void cli_message_subject(const char *about);
+/* From now on all of them say who says so, such as "rank 2"; the text must live. */
+void cli_message_speaker(const char *who);
 /* The text of the last error since then, "" for none. Valid until the next. */
 const char *cli_last_error(void);
 
@@ -144,6 +146,9 @@ int cli_interrupted(void);
 
 /* Says that the work was interrupted, once. */
 void cli_tell_interrupted(void);
+
+/* From now on that is for others to say. */
+void cli_hush_interrupted(void);
 
 /* Whether from now on work that asks is not stopped any more: what is left is short, and better
  * whole. */

@@ -1,4 +1,5 @@
 #include "fit.h"
+#include "ranks.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -99,6 +100,51 @@ static uint32_t half_of(const ovoid_fit_result *result) {
     return (uint32_t)(units <= half ? half / units * units : half);
 }
 
+/* Whether other ranks take part: in what is cut into parts. Says so where they cannot. */
+static bool is_shared(const fit_job *job) {
+    const ovoid_fit_options *options = &job->options;
+    const size_t atoms = ovoid_molecule_atoms(job->molecule);
+    const size_t whole = options->parts.atoms ? options->parts.atoms : OVOID_DEFAULT_WHOLE_ATOMS;
+    static bool said;
+    if (ranks_count() == 1)
+        return false;
+    if (options->method == OVOID_METHOD_ADAPTIVE && atoms > whole && !job->session)
+        return true;
+    if (!said && !job->quiet)
+        cli_warning("rank 0 of %u works alone: %s", (unsigned)ranks_count(),
+                    options->method != OVOID_METHOD_ADAPTIVE
+                        ? "a fit by method l1 has no parts that ranks could share"
+                    : job->session ? "models of one file follow one another"
+                                   : "a molecule of one part cannot be shared, and --part-atoms "
+                                     "makes parts of fewer atoms");
+    said = true;
+    return false;
+}
+
+/* Ranks get atoms, and not what places them. */
+static void leave_symmetry(fit_job *job) {
+    ovoid_parts_options *const parts = &job->options.parts;
+    if (!ovoid_molecule_placements(job->molecule, NULL) || parts->symmetry != OVOID_SYMMETRY_USE)
+        return;
+    parts->symmetry = OVOID_SYMMETRY_IGNORE;
+    if (!job->quiet)
+        cli_warning("ranks share all atoms of an assembly, as with --no-symmetry; one process may "
+                    "be faster, if it is symmetric");
+}
+
+static ovoid_status reach(fit_job *job, const ovoid_fit_options *options, fit_level *now) {
+    const double limit = job->time_limit;
+    const double left = limit > 0.0 ? limit - (cli_seconds() - job->fit_began) : 0.0;
+    if (!job->shared)
+        return ovoid_fitter_reach(job->context, job->fitter, options, &now->model, &now->result);
+    const ovoid_status status =
+        ranks_reach(job->context, job->fitter, job->molecule, options,
+                    limit > 0.0 ? fmax(left, 1e-3) : 0.0, &now->model, &now->result);
+    if (status == OVOID_ERROR_CANCELLED && limit > 0.0 && cli_seconds() - job->fit_began >= limit)
+        job->out_of_time = true; /* another rank has seen it first */
+    return status;
+}
+
 /* The goal's model, or after it one with half the ellipsoids of the level before: that one begins
  * with the atoms, too, for they merge better than what has been fitted. */
 static ovoid_status fit_model(fit_job *job, size_t level) {
@@ -115,10 +161,9 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
             return status;
     }
     ovoid_context_on_progress(job->context, on_progress, job);
-    ovoid_status status =
-        ovoid_fitter_reach(job->context, job->fitter, &options, &now->model, &now->result);
+    ovoid_status status = reach(job, &options, now);
     ovoid_context_on_progress(job->context, cli_on_progress, NULL);
-    if (status == OVOID_ERROR_CANCELLED && now->model && !cli_interrupted()) {
+    if (status == OVOID_ERROR_CANCELLED && now->model && job->out_of_time && !cli_interrupted()) {
         now->stopped = true;
         status = OVOID_OK;
     }
@@ -367,6 +412,11 @@ int fit_run(fit_job *job) {
         return CLI_USAGE;
     if (!ovoid_context_device(job->context) && (status = open_device(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
+    job->shared = is_shared(job);
+    if (job->shared)
+        leave_symmetry(job);
+    if (job->shared && !ranks_open(job->asked_device, &levels))
+        return levels;
     status = run_fit(job, &levels, &measured);
     if (ran_out(job, status)) {
         cli_error("no model held within the %.9g s of --time-limit, and none is written",
@@ -420,8 +470,11 @@ int cli_fit(int argc, char **argv) {
     int code;
     if (fit_options_parse(argc, argv, &job, &code)) {
         job.summary = choose_summary(&job);
-        if (cli_context(&job.quiet, &job.context, &code))
+        if (cli_context(&job.quiet, &job.context, &code)) {
+            job.asked_device = job.device;
+            job.device = ranks_device(job.context, job.device);
             code = run(&job);
+        }
     }
     fit_job_destroy(&job);
     ovoid_context_destroy(&job.context);

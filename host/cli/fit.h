@@ -47,6 +47,7 @@ typedef struct fit_job {
     const char *owners;                        /* of the first level, NULL: none */
     char *own_output, *own_trace, *own_owners; /* what these may point to */
     const char *device;                        /* NULL: the default */
+    const char *asked_device;                  /* as --device has it: each rank takes its own */
     const char *folder;  /* NULL: one molecule; else of several, where all goes (see fit_batch.c) */
     char *const *inputs; /* of several molecules */
     size_t input_count;
@@ -71,6 +72,7 @@ typedef struct fit_job {
     ovoid_fitter *fitter;             /* during the fits; with a session until that takes it */
     int32_t moved_from;               /* model that the session began with; 0: with the atoms */
     bool out_of_time;                 /* the time limit ended them */
+    bool shared;                      /* other ranks take part in the fits */
     fit_level levels[FIT_LEVELS_MAX]; /* all have their paths from the start */
     size_t levels_done; /* have their models; fewer than asked for where halving ends */
     fit_trace tracer;

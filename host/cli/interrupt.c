@@ -100,6 +100,10 @@ int cli_interrupted(void) {
     return caught;
 }
 
+void cli_hush_interrupted(void) {
+    atomic_store(&told, true);
+}
+
 void cli_tell_interrupted(void) {
     if (!atomic_exchange(&told, true))
         cli_error("interrupted");

@@ -1,4 +1,5 @@
 #include "cli.h"
+#include "ranks.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -31,6 +32,7 @@ static const subcommand subcommands[] = {
 enum { SUBCOMMANDS = sizeof subcommands / sizeof subcommands[0] };
 
 static const char *subject; /* what messages are about, NULL: nothing in particular */
+static const char *speaker; /* who says them, NULL: the program */
 static char *last_error;
 
 /* The text of a message; NULL without memory. */
@@ -51,10 +53,11 @@ static char *print_message(const char *kind, const char *format, va_list args) {
     const char *const shown = text ? text : format;
     cli_progress_erase();
     fflush(stdout); /* so that both streams read in order where they end up in one place */
+    fprintf(stderr, "ovoid: %s%s", speaker ? speaker : "", speaker ? ": " : "");
     if (subject && !strstr(shown, subject))
-        fprintf(stderr, "ovoid: %s: %s: %s\n", kind, subject, shown);
+        fprintf(stderr, "%s: %s: %s\n", kind, subject, shown);
     else
-        fprintf(stderr, "ovoid: %s: %s\n", kind, shown);
+        fprintf(stderr, "%s: %s\n", kind, shown);
     return text;
 }
 
@@ -62,6 +65,10 @@ void cli_message_subject(const char *about) {
     subject = about;
     free(last_error);
     last_error = NULL;
+}
+
+void cli_message_speaker(const char *who) {
+    speaker = who;
 }
 
 const char *cli_last_error(void) {
@@ -258,7 +265,7 @@ static int run(int argc, char **argv) {
     }
     const char *first = argv[1];
     if (strcmp(first, "--version") == 0) {
-        printf("ovoid %s\n", ovoid_version());
+        printf("ovoid %s\n%s", ovoid_version(), ranks_version());
         return CLI_OK;
     }
     if (strcmp(first, "--help") == 0 || strcmp(first, "-h") == 0 || strcmp(first, "help") == 0)
@@ -298,7 +305,10 @@ int main(int argc, char **argv) {
         setvbuf(stdout, buffer, _IOFBF, sizeof buffer);
     cli_catch_signals();
     ovoid_prepare_process();
-    int code = run(argc, argv);
+    int code;
+    if (ranks_serve(&argc, &argv, &code))
+        return code;
+    code = run(argc, argv);
     errno = 0;
     if (fflush(stdout) != 0 || ferror(stdout)) {
         /* Whoever asked for the output to be written has reported it already. */
@@ -310,5 +320,6 @@ int main(int argc, char **argv) {
             code = CLI_OUTPUT;
         }
     }
+    ranks_end();
     return code;
 }

@@ -1,4 +1,5 @@
 #include "fit.h"
+#include "ranks.h"
 
 #include <math.h>
 #include <string.h>
@@ -104,10 +105,11 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
     b->good = b->good && cJSON_AddBoolToObject(b->object, "stopped", level->stopped);
     if (!l1)
         add_number(b, "solver_iterations", (double)result->adaptive.solver_iterations);
-    if (!l1)
+    if (!l1) {
         add_number(b, "parts", (double)result->parts);
-    if (!l1)
         add_number(b, "units", (double)result->units);
+        add_number(b, "ranks", job->shared ? (double)ranks_count() : 1.0);
+    }
     if (level->measured)
         b->good = b->good && measures_report(b->object, &level->measures, &job->measuring);
 }

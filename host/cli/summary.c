@@ -1,4 +1,5 @@
 #include "fit.h"
+#include "ranks.h"
 
 #include <math.h>
 #include <string.h>
@@ -37,6 +38,8 @@ static void print_work(FILE *out, const fit_job *job) {
         fprintf(out, ", %llu parts", (count)result->parts);
     if (options->method == OVOID_METHOD_ADAPTIVE && result->units > 1)
         fprintf(out, ", one of %llu units", (count)result->units);
+    if (job->shared)
+        fprintf(out, ", %u ranks", (unsigned)ranks_count());
     if (options->method == OVOID_METHOD_ADAPTIVE)
         putc('\n', out);
 }

@@ -245,12 +245,13 @@ static ovoid_status repeat_unit(ovoid_fitter *fitter, ov_found *found, ovoid_fit
 }
 
 static ovoid_status reach_by_unit(ovoid_fitter *fitter, const ovoid_fit_options *options,
-                                  double began, ov_found *found, ovoid_fit_result *result) {
+                                  double began, ov_ranks *ranks, ov_found *found,
+                                  ovoid_fit_result *result) {
     const ov_images images = {fitter->symmetry.motion, fitter->symmetry.order};
     ovoid_fit_options of_unit = *options;
     of_unit.adaptive.ellipsoids /= (uint32_t)images.count;
     ovoid_status status = ov_parts_reach(fitter->context, fitter->unit, fitter->symmetry.unit_atoms,
-                                         &images, &of_unit, began, found, result);
+                                         &images, &of_unit, began, ranks, found, result);
     if (found->count > 0) {
         const ovoid_status repeated = repeat_unit(fitter, found, result);
         status = repeated == OVOID_OK ? status : repeated;
@@ -259,15 +260,16 @@ static ovoid_status reach_by_unit(ovoid_fitter *fitter, const ovoid_fit_options 
 }
 
 static ovoid_status reach_with_all(ovoid_fitter *fitter, const ovoid_fit_options *options,
-                                   double began, ov_found *found, ovoid_fit_result *result) {
+                                   double began, ov_ranks *ranks, ov_found *found,
+                                   ovoid_fit_result *result) {
     static const ov_images alone = {&ov_rigid_identity, 1};
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = fitter->context;
     const ov_found *const start = fitter->start.count > 0 ? &fitter->start : NULL;
     OV_TRY(need_all(fitter));
     if (!start && ov_parts_wanted(options, fitter->atoms))
-        return ov_parts_reach(context, fitter->xyzr, fitter->atoms, &alone, options, began, found,
-                              result);
+        return ov_parts_reach(context, fitter->xyzr, fitter->atoms, &alone, options, began, ranks,
+                              found, result);
     if (!fitter->adaptive)
         OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, NULL, !fitter->once,
                                   &fitter->adaptive));
@@ -277,15 +279,15 @@ cleanup:
 }
 
 static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *options,
-                                 double began, ovoid_ellipsoid **ellipsoids, uint32_t **owner,
-                                 ovoid_fit_result *result) {
+                                 double began, ov_ranks *ranks, ovoid_ellipsoid **ellipsoids,
+                                 uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = fitter->context;
     ov_found found = {0};
     OV_TRY(ov_adaptive_check(context, &options->adaptive, fitter->atoms));
     status = is_fitted_by_unit(fitter, options)
-                 ? reach_by_unit(fitter, options, began, &found, result)
-                 : reach_with_all(fitter, options, began, &found, result);
+                 ? reach_by_unit(fitter, options, began, ranks, &found, result)
+                 : reach_with_all(fitter, options, began, ranks, &found, result);
     if (found.count > 0) {
         if (hand_over(context, &found, fitter->atoms, ellipsoids, owner) != OVOID_OK) {
             status = OVOID_ERROR_MEMORY;
@@ -300,10 +302,25 @@ cleanup:
     return status;
 }
 
+static uint64_t hash_start(const ov_found *start) {
+    return start->count > 0 ? ov_hash(start->quadrics, start->count * sizeof *start->quadrics) : 0;
+}
+
+static ovoid_status meet_ranks(const ovoid_fitter *fitter, const ovoid_fit_options *options,
+                               ov_ranks *ranks) {
+    const bool by_unit = is_fitted_by_unit(fitter, options);
+    const double *const xyzr = by_unit || !fitter->xyzr ? fitter->unit : fitter->xyzr;
+    const size_t atoms = xyzr == fitter->unit ? fitter->symmetry.unit_atoms : fitter->atoms;
+    return ov_ranks_begin(fitter->context, options, xyzr, atoms, hash_start(&fitter->start), ranks);
+}
+
 static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, double began,
                         ovoid_ellipsoid **ellipsoids, uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_device *device;
+    ov_ranks ranks = {0};
+    if (options->method == OVOID_METHOD_ADAPTIVE)
+        OV_TRY(meet_ranks(fitter, options, &ranks));
     OV_TRY(ov_fit_options_check(fitter->context, options));
     ov_progress_fit(fitter->context, options->method);
     result->method = options->method;
@@ -311,9 +328,9 @@ static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, 
     OV_TRY(ov_device_get(fitter->context, &device));
     OV_TRY(options->method == OVOID_METHOD_L1
                ? fit_l1(fitter, options, began, ellipsoids, owner, result)
-               : fit_adaptive(fitter, options, began, ellipsoids, owner, result));
+               : fit_adaptive(fitter, options, began, &ranks, ellipsoids, owner, result));
 cleanup:
-    return status;
+    return ov_ranks_end(fitter->context, &ranks, status);
 }
 
 /* The model of what was found, and the last of the result. */

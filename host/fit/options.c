@@ -42,7 +42,8 @@ void ovoid_fit_options_init(ovoid_fit_options *options, size_t size) {
                   .jobs = 0,
                   .resume = 0,
                   .symmetry = OVOID_SYMMETRY_USE,
-                  .checkpoint = NULL},
+                  .checkpoint = NULL,
+                  .exchange = NULL},
     };
     ov_sized_init(options, size, &defaults, sizeof defaults);
 }
@@ -113,6 +114,18 @@ static ovoid_status check_adaptive(ovoid_context *context, const ovoid_adaptive_
     return check_ranges(context, ranges, sizeof ranges / sizeof *ranges);
 }
 
+ovoid_status ov_exchange_check(ovoid_context *context, const ovoid_exchange *exchange) {
+    if (!exchange->gather)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option parts.exchange has no function that gathers");
+    if (exchange->rank >= exchange->ranks)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "option parts.exchange must have a rank below the number of ranks, %lu; it "
+                       "is %lu",
+                       (unsigned long)exchange->ranks, (unsigned long)exchange->rank);
+    return OVOID_OK;
+}
+
 static ovoid_status check_parts(ovoid_context *context, const ovoid_parts_options *parts) {
     if (parts->atoms > 0 && parts->atoms < OVOID_LEAST_PART_ATOMS)
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
@@ -129,7 +142,7 @@ static ovoid_status check_parts(ovoid_context *context, const ovoid_parts_option
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "option parts.symmetry must be one of OVOID_SYMMETRY_...; it is %lu",
                        (unsigned long)parts->symmetry);
-    return OVOID_OK;
+    return parts->exchange ? ov_exchange_check(context, parts->exchange) : OVOID_OK;
 }
 
 static ovoid_status check_l1(ovoid_context *context, const ovoid_l1_options *l1) {
@@ -184,4 +197,14 @@ ovoid_status ov_fit_options_check(ovoid_context *context, const ovoid_fit_option
     }
     return ov_fail(context, OVOID_ERROR_ARGUMENT,
                    "option method must be one of OVOID_METHOD_...; it is %d", (int)options->method);
+}
+
+uint64_t ov_fit_options_hash(const ovoid_fit_options *options) {
+    const ovoid_adaptive_options *const a = &options->adaptive;
+    const double numbers[] = {options->decay, options->isovalue, options->spacing, options->padding,
+                              a->tolerance,   a->ratio,          a->mesh_spacing};
+    const uint64_t counts[] = {(uint64_t)options->method, (uint64_t)a->goal, a->ellipsoids,
+                               a->effort, a->steps};
+    const uint64_t both[] = {ov_hash(numbers, sizeof numbers), ov_hash(counts, sizeof counts)};
+    return ov_hash(both, sizeof both);
 }

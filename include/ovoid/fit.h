@@ -88,6 +88,30 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
 #define OVOID_DEFAULT_WHOLE_ATOMS 65536
 #define OVOID_DEFAULT_PART_ATOMS 16384
 
+/* A fit in parts that several processes share, such as the ranks of an MPI job: each of them makes
+ * the same call, each fits some of the parts, and all come to the same model. The library knows no
+ * MPI; the caller brings what passes bytes around.
+ *
+ * All ranks give the same molecule and the same options but for `jobs`, on equal devices, and run
+ * the same version of the library on machines of one byte order: what differs is found at the
+ * beginning, and refused on all of them (OVOID_ERROR_ARGUMENT) with what it is; only unequal
+ * devices are no more than a warning on rank 0, for they may come to other last bits. What one rank
+ * meets, an error or a progress callback that stops, ends the fit on all of them with its status
+ * and its text, which names the rank, when next they exchange: at the latest when each has done the
+ * parts that it is at. What is not fitted in parts each rank fits by itself, to the same model. */
+typedef struct ovoid_exchange { /* 24 bytes */
+    uint32_t rank, ranks;       /* of this process, from 0, and how many there are */
+    /* Gives all ranks the bytes of all. `mine` has sizes[rank] of them, and `all` gets those of
+     * rank 0, then of rank 1 and so on: sizes[0] + sizes[1] + ... bytes, which is what there is
+     * room for. `sizes`, one for each rank, are the same on all of them, and a size may be 0. All
+     * arrays are the library's, and are theirs until it returns. Every rank calls it equally often
+     * and in the same order, on the thread that called the library; it returns when the bytes are
+     * there, however long the other ranks take. Not 0: they cannot be exchanged any more; the fit
+     * then ends on this rank with OVOID_ERROR_IO, without another call. */
+    int (*gather)(const void *mine, void *all, const uint64_t *sizes, void *user);
+    void *user;
+} ovoid_exchange;
+
 /* How method adaptive cuts a molecule into parts. A part is fitted among its neighbours, those that
  * were fitted before as their ellipsoids and the others as their atoms, so that the goal holds
  * across seams; no ellipsoid stands for atoms of two parts, but where seams were mended. The model
@@ -109,7 +133,7 @@ typedef enum ovoid_symmetry {
     OVOID_SYMMETRY_IGNORE   /* the assembly is fitted as any molecule */
 } ovoid_symmetry;
 
-typedef struct ovoid_parts_options { /* 24 bytes */
+typedef struct ovoid_parts_options { /* 32 bytes */
     uint32_t atoms;  /* of a part at most, from OVOID_LEAST_PART_ATOMS; 0: OVOID_DEFAULT_PART_ATOMS
                         in a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */
     uint32_t jobs;   /* parts side by side on each device, each with a thread and a queue of its
@@ -117,7 +141,10 @@ typedef struct ovoid_parts_options { /* 24 bytes */
     uint32_t resume; /* not 0: goes on where the checkpoint ends, if there is one */
     uint32_t symmetry;      /* an ovoid_symmetry: USE. A fit that begins with a model uses none */
     const char *checkpoint; /* a file that gets each part as it is done, or NULL. It may not be
-                               there unless the fit resumes, and stays whatever comes of that */
+                               there unless the fit resumes, and stays whatever comes of that. Of
+                               several ranks, rank 0 alone reads and writes it */
+    const ovoid_exchange *exchange; /* with the other processes that share the fit, the caller's;
+                                       NULL: there are none */
 } ovoid_parts_options;
 
 #define OVOID_LEAST_PART_ATOMS 64

@@ -65,6 +65,7 @@ run "$OVOID" --version
 expect_code 0
 expect_silent
 grep -qE '^ovoid [0-9]+\.[0-9]+\.[0-9]+$' "$out" || fail "a version was expected"
+! grep -qvE '^(ovoid [0-9.]+|with MPI)$' "$out" || fail "nothing else was expected"
 
 # Without a command the help is an error.
 run "$OVOID"

@@ -1,7 +1,8 @@
 #include "fit/parts/checkpoint.h"
 
-#include "base/sized.h"
 #include "device/device.h"
+#include "fit/options.h"
+#include "fit/parts/record.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -18,40 +19,17 @@ typedef struct header {
     uint64_t version, device, input, options, parts;
 } header;
 
-typedef struct record {
-    uint64_t part, ellipsoids, atoms;
-    uint64_t points, iterations, solver_iterations;
-    uint64_t counts[OVOID_COUNTS];
-    double spacing, distance;
-    uint64_t verdict;
-    uint64_t hash; /* of the ellipsoids, the owners, and of this with hash 0 */
-} record;
-
 /* ---- of what fit ----------------------------------------------------------------------------- */
 
-static uint64_t with(uint64_t hash, const void *bytes, size_t count) {
-    const uint64_t both[2] = {hash, ov_hash(bytes, count)};
-    return ov_hash(both, sizeof both);
-}
-
-/* What the model depends on; not where the file is, nor how many parts are under way at once. */
-static uint64_t hash_options(const ovoid_fit_options *options) {
-    const ovoid_adaptive_options *const a = &options->adaptive;
-    const double numbers[] = {options->decay, options->isovalue, options->spacing, options->padding,
-                              a->tolerance,   a->ratio,          a->mesh_spacing};
-    const uint64_t counts[] = {(uint64_t)options->method, (uint64_t)a->goal, a->ellipsoids,
-                               a->effort, a->steps};
-    return with(ov_hash(numbers, sizeof numbers), counts, sizeof counts);
-}
-
 static ovoid_status make_header(ovoid_context *context, const ov_parts *parts, header *made) {
-    *made = (header){.magic = MAGIC,
-                     .version = ov_hash(ovoid_version(), strlen(ovoid_version())),
-                     .input = with(ov_hash(parts->xyzr, 4 * parts->atoms * sizeof *parts->xyzr),
-                                   parts->partition.image,
-                                   parts->partition.images * sizeof *parts->partition.image),
-                     .options = hash_options(parts->options),
-                     .parts = parts->partition.count};
+    *made =
+        (header){.magic = MAGIC,
+                 .version = ov_hash(ovoid_version(), strlen(ovoid_version())),
+                 .input = ov_hash_with(ov_hash(parts->xyzr, 4 * parts->atoms * sizeof *parts->xyzr),
+                                       parts->partition.image,
+                                       parts->partition.images * sizeof *parts->partition.image),
+                 .options = ov_fit_options_hash(parts->options),
+                 .parts = parts->partition.count};
     return ov_device_hash(context, &made->device);
 }
 
@@ -78,77 +56,35 @@ static ovoid_status check_header(ovoid_context *context, const char *path, const
 
 /* ---- records --------------------------------------------------------------------------------- */
 
-static uint64_t hash_of(const record *r, const ov_found *found) {
-    record plain = *r;
-    plain.hash = 0;
-    const uint64_t hash = with(ov_hash(&plain, sizeof plain), found->quadrics,
-                               found->count * sizeof *found->quadrics);
-    return with(hash, found->owner, (size_t)r->atoms * sizeof *found->owner);
-}
-
-static record record_of(const ov_parts *parts, size_t part, const ov_part_fit *fit) {
-    const ovoid_fit_result *const result = &fit->result;
-    record r;
-    memset(&r, 0, sizeof r); /* its hash is of all bytes */
-    r.part = part;
-    r.ellipsoids = fit->found.count;
-    r.atoms = parts->partition.part[part].count;
-    r.points = result->points;
-    r.iterations = result->iterations;
-    r.solver_iterations = result->adaptive.solver_iterations;
-    memcpy(r.counts, result->counts, sizeof r.counts);
-    r.spacing = result->spacing;
-    r.distance = result->distance;
-    r.verdict = (uint64_t)result->verdict;
-    r.hash = hash_of(&r, &fit->found);
-    return r;
-}
-
-static void tell(const record *r, ovoid_fit_result *result) {
-    ovoid_fit_result_init(result, sizeof *result);
-    result->method = OVOID_METHOD_ADAPTIVE;
-    result->ellipsoids = r->ellipsoids;
-    result->points = r->points;
-    result->iterations = r->iterations;
-    result->adaptive.solver_iterations = r->solver_iterations;
-    memcpy(result->counts, r->counts, sizeof r->counts);
-    result->spacing = r->spacing;
-    result->distance = r->distance;
-    result->verdict = (ovoid_verdict)r->verdict;
-    result->reached = result->verdict == OVOID_VERDICT_REACHED;
-}
-
 /* Reads the record that follows; *whole says whether there was one. */
 static ovoid_status read_record(ovoid_context *context, FILE *file, ov_parts *parts, bool *done,
                                 bool *whole) {
     ovoid_status status = OVOID_OK;
-    record r;
-    ov_found found = {0};
+    ov_record record;
+    ov_part_fit fit = {0};
+    void *rest = NULL;
     *whole = false;
-    if (fread(&r, sizeof r, 1, file) != 1 || r.part >= parts->partition.count ||
-        r.atoms != parts->partition.part[r.part].count || r.ellipsoids == 0 ||
-        r.ellipsoids > 2 * r.atoms + 2)
+    if (fread(&record, sizeof record, 1, file) != 1 || record.part >= parts->partition.count ||
+        record.atoms != parts->partition.part[record.part].count || record.ellipsoids == 0 ||
+        !ov_record_is_sound(&record))
         return OVOID_OK;
-    found.count = (size_t)r.ellipsoids;
-    found.quadrics = ov_alloc(context, found.count, sizeof *found.quadrics, "ellipsoids");
-    found.owner = ov_alloc(context, (size_t)r.atoms, sizeof *found.owner, "owners");
-    if (!found.quadrics || !found.owner) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
+    const size_t size = ov_record_rest(&record);
+    rest = ov_alloc(context, size, 1, "a part");
+    if (!rest)
+        return OVOID_ERROR_MEMORY;
+    if (fread(rest, 1, size, file) == size) {
+        ov_reading from = {rest, size};
+        status = ov_record_read(context, &record, &from, &fit);
+        *whole = status == OVOID_OK;
     }
-    if (fread(found.quadrics, sizeof *found.quadrics, found.count, file) != found.count ||
-        fread(found.owner, sizeof *found.owner, (size_t)r.atoms, file) != r.atoms ||
-        hash_of(&r, &found) != r.hash)
-        goto cleanup;
-    ov_part_fit *const fit = &parts->fit[r.part];
-    ov_found_destroy(&fit->found);
-    fit->found = found;
-    done[r.part] = true;
-    found = (ov_found){0};
-    tell(&r, &fit->result);
-    *whole = true;
-cleanup:
-    ov_found_destroy(&found);
+    if (status == OVOID_ERROR_FORMAT)
+        status = OVOID_OK; /* what follows is lost */
+    if (*whole) {
+        ov_found_destroy(&parts->fit[record.part].found);
+        parts->fit[record.part] = fit;
+        done[record.part] = true;
+    }
+    free(rest);
     return status;
 }
 
@@ -226,15 +162,15 @@ cleanup:
 
 ovoid_status ov_checkpoint_add(ovoid_context *context, ov_checkpoint *c, const ov_parts *parts,
                                size_t part, const ov_part_fit *fit) {
-    const record r = record_of(parts, part, fit);
-    const ov_found *const found = &fit->found;
-    if (fwrite(&r, sizeof r, 1, c->file) == 1 &&
-        fwrite(found->quadrics, sizeof *found->quadrics, found->count, c->file) == found->count &&
-        fwrite(found->owner, sizeof *found->owner, (size_t)r.atoms, c->file) == r.atoms &&
-        write_through(c))
-        return OVOID_OK;
-    const ovoid_status status = fail_io(context, c->path, "written");
-    cut_off(c);
+    ovoid_status status = OVOID_OK;
+    ov_bytes bytes = {0};
+    OV_TRY(ov_record_put(context, part, parts->partition.part[part].count, fit, &bytes));
+    if (fwrite(bytes.data, 1, bytes.count, c->file) != bytes.count || !write_through(c)) {
+        status = fail_io(context, c->path, "written");
+        cut_off(c);
+    }
+cleanup:
+    ov_bytes_destroy(&bytes);
     return status;
 }
 

@@ -6,6 +6,7 @@
 #define OV_FIT_PART_H
 
 #include "fit/adaptive/adaptive.h"
+#include "fit/parts/ranks.h"
 #include "measure/partition.h"
 #include "measure/survey.h"
 
@@ -20,6 +21,7 @@ typedef struct ov_parts {
     size_t atoms;
     const ovoid_fit_options *options;
     const double *centre; /* angstrom: that the images of all lie about; NULL: there are none */
+    ov_ranks *ranks;      /* that share it */
     double margin; /* angstrom: this far from the box of its centres a part's surface is judged, */
     double reach;  /* and what is this far from it counts there */
     ov_partition partition;

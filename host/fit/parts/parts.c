@@ -6,6 +6,9 @@
 #include "fit/parts/checkpoint.h"
 #include "fit/parts/crew.h"
 #include "fit/parts/patch.h"
+#include "fit/parts/record.h"
+#include "fit/parts/rounds.h"
+#include "fit/parts/survey_bytes.h"
 #include "fit/parts/workers.h"
 
 #include <math.h>
@@ -172,19 +175,55 @@ static ovoid_status fit_commit(ovoid_context *context, size_t part, void *user) 
     return OVOID_OK;
 }
 
+static ovoid_status fit_pack(ovoid_context *context, size_t part, ov_bytes *to, void *user) {
+    const job *const j = user;
+    const ov_part_fit *const done = &j->parts->fit[part]; /* one of the checkpoint */
+    return ov_record_put(context, part, j->parts->partition.part[part].count,
+                         done->found.count > 0 ? done : &j->fresh[part], to);
+}
+
+static ovoid_status fit_unpack(ovoid_context *context, size_t part, ov_reading *from, void *user) {
+    job *const j = user;
+    return ov_record_take(context, part, j->parts->partition.part[part].count, from,
+                          &j->fresh[part]);
+}
+
+static ovoid_status resumed_unpack(ovoid_context *context, size_t part, ov_reading *from,
+                                   void *user) {
+    job *const j = user;
+    return ov_record_take(context, part, j->parts->partition.part[part].count, from,
+                          &j->parts->fit[part]);
+}
+
+/* Rank 0 opens the checkpoint, and tells the others which parts are there. */
+static ovoid_status resume(ovoid_context *context, job *j) {
+    const ovoid_parts_options *const wanted = &j->parts->options->parts;
+    const ov_shared_work work = {.work = {.user = j}, .pack = fit_pack, .unpack = resumed_unpack};
+    ovoid_status status = OVOID_OK;
+    if (!wanted->checkpoint)
+        return OVOID_OK;
+    if (ov_ranks_first(j->parts->ranks))
+        status = ov_checkpoint_open(context, wanted->checkpoint, wanted->resume != 0, j->parts,
+                                    j->todo, &j->file);
+    return ov_ranks_give(context, j->parts->ranks, j->parts->partition.count, j->todo, &work,
+                         status);
+}
+
 /* Each part from its atoms, in turn; those of the checkpoint are there. */
 static ovoid_status fit_all(ovoid_context *context, job *j) {
     ovoid_status status = OVOID_OK;
     const ov_partition *const cut = &j->parts->partition;
-    const ovoid_parts_options *const wanted = &j->parts->options->parts;
-    const ov_part_work work = {
-        .todo = j->todo, .in_turn = true, .task = fit_task, .commit = fit_commit, .user = j};
-    if (wanted->checkpoint)
-        OV_TRY(ov_checkpoint_open(context, wanted->checkpoint, wanted->resume != 0, j->parts,
-                                  j->todo, &j->file));
+    const ov_shared_work work = {.work = {.todo = j->todo,
+                                          .in_turn = true,
+                                          .task = fit_task,
+                                          .commit = fit_commit,
+                                          .user = j},
+                                 .pack = fit_pack,
+                                 .unpack = fit_unpack};
+    OV_TRY(resume(context, j));
     for (size_t p = 0; p < cut->count; ++p)
         j->todo[p] = !j->todo[p]; /* what is not done */
-    OV_TRY(ov_parts_work(context, cut, jobs_of(j->parts), &work));
+    OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, jobs_of(j->parts), &work));
 cleanup:
     ov_checkpoint_close(&j->file);
     return status;
@@ -207,18 +246,31 @@ static ovoid_status survey_commit(ovoid_context *context, size_t part, void *use
     return OVOID_OK;
 }
 
+static ovoid_status survey_pack(ovoid_context *context, size_t part, ov_bytes *to, void *user) {
+    const job *const j = user;
+    return ov_survey_cell_put(context, &j->fresh_cell[part], to);
+}
+
+static ovoid_status survey_unpack(ovoid_context *context, size_t part, ov_reading *from,
+                                  void *user) {
+    job *const j = user;
+    return ov_survey_cell_take(context, from, &j->fresh_cell[part]);
+}
+
 /* Surveys the cells of the parts in todo, and joins all. */
 static ovoid_status survey(ovoid_context *context, job *j) {
     ovoid_status status = OVOID_OK;
     const ov_partition *const cut = &j->parts->partition;
-    const ov_part_work work = {
-        .todo = j->todo, .task = survey_task, .commit = survey_commit, .user = j};
+    const ov_shared_work work = {
+        .work = {.todo = j->todo, .task = survey_task, .commit = survey_commit, .user = j},
+        .pack = survey_pack,
+        .unpack = survey_unpack};
     const ov_survey_images images = {.image = cut->image,
                                      .count = cut->images,
                                      .spacing = j->parts->options->adaptive.mesh_spacing,
                                      .centre = j->parts->centre};
     ov_progress_stage(context, "measure");
-    OV_TRY(ov_parts_work(context, cut, jobs_of(j->parts), &work));
+    OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, jobs_of(j->parts), &work));
     ov_survey_total_destroy(&j->total);
     OV_TRY(ov_survey_join(context, j->cell, cut->count, &images, ov_tuned.spots_apart, &j->total));
 cleanup:
@@ -413,7 +465,7 @@ static void find_centre(const ov_images *images, double centre[3]) {
 
 ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t atoms,
                             const ov_images *images, const ovoid_fit_options *options, double began,
-                            ov_found *found, ovoid_fit_result *result) {
+                            ov_ranks *ranks, ov_found *found, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ovoid_fit_options of_parts = *options; /* the points are as close as in the whole */
     double centre[3];
@@ -421,6 +473,7 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
     ov_parts parts = {.xyzr = xyzr,
                       .atoms = atoms,
                       .options = &of_parts,
+                      .ranks = ranks,
                       .centre = images->count > 1 ? centre : NULL,
                       .partition = {.image = images->motion, .images = images->count}};
     job j = {.parts = &parts};

@@ -6,6 +6,7 @@
 
 #include "base/rigid.h"
 #include "fit/adaptive/adaptive.h"
+#include "fit/parts/ranks.h"
 
 /* Whether so many atoms are fitted in parts. */
 bool ov_parts_wanted(const ovoid_fit_options *options, size_t atoms);
@@ -19,9 +20,9 @@ typedef struct ov_images {
 /* As ov_adaptive_reach() from the atoms, which are the unit of the assembly that its images make;
  * *found is of the unit, and so is a number of ellipsoids that is asked for. The parts that are
  * done when it is stopped, with the others' atoms as they are, are what held, where a tolerance is
- * the goal. */
+ * the goal. On all ranks that share it, it comes to the same. */
 ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t atoms,
                             const ov_images *images, const ovoid_fit_options *options, double began,
-                            ov_found *found, ovoid_fit_result *result);
+                            ov_ranks *ranks, ov_found *found, ovoid_fit_result *result);
 
 #endif

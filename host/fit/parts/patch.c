@@ -1,6 +1,8 @@
 #include "fit/parts/patch.h"
 
 #include "fit/adaptive/constants.h"
+#include "fit/parts/record.h"
+#include "fit/parts/rounds.h"
 #include "fit/parts/scene.h"
 #include "fit/parts/workers.h"
 #include "mesh/union.h"
@@ -291,6 +293,36 @@ cleanup:
     return status;
 }
 
+/* For other ranks: which ellipsoids and atoms, and what became of them. */
+static ovoid_status pack(ovoid_context *context, size_t p, ov_bytes *to, void *user) {
+    ovoid_status status = OVOID_OK;
+    const patches *const all = user;
+    const patch *const one = &all->patch[p];
+    const uint64_t counts[] = {one->ellipsoids, one->atoms};
+    OV_TRY(ov_bytes_put(context, to, counts, sizeof counts));
+    OV_TRY(ov_bytes_put(context, to, one->ellipsoid, one->ellipsoids * sizeof *one->ellipsoid));
+    OV_TRY(ov_bytes_put(context, to, one->atom, one->atoms * sizeof *one->atom));
+    OV_TRY(ov_record_put(context, p, one->atoms, &one->fit, to));
+cleanup:
+    return status;
+}
+
+static ovoid_status unpack(ovoid_context *context, size_t p, ov_reading *from, void *user) {
+    ovoid_status status = OVOID_OK;
+    patch *const one = &((patches *)user)->patch[p];
+    uint64_t counts[2];
+    if (!ov_bytes_take(from, counts, sizeof counts))
+        return ov_fail(context, OVOID_ERROR_FORMAT, "a message ends within a patch");
+    OV_TRY(ov_bytes_take_array(context, from, &one->ellipsoid, counts[0], sizeof *one->ellipsoid,
+                               "ellipsoids"));
+    one->ellipsoids = (size_t)counts[0];
+    OV_TRY(ov_bytes_take_array(context, from, &one->atom, counts[1], sizeof *one->atom, "atoms"));
+    one->atoms = (size_t)counts[1];
+    OV_TRY(ov_record_take(context, p, one->atoms, from, &one->fit));
+cleanup:
+    return status;
+}
+
 /* ---- the model after it ---------------------------------------------------------------------- */
 
 /* The model's ellipsoids less those of the patches of a colour, and these patches' own behind them.
@@ -366,10 +398,11 @@ ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t job
                    .reach = ov_tuned.patch_reach * length};
     OV_TRY(make_patches(context, spots, count, &all));
     for (uint32_t colour = 0; colour < all.cut.colours; ++colour) {
-        const ov_part_work work = {.todo = all.todo, .task = task, .user = &all};
+        const ov_shared_work work = {
+            .work = {.todo = all.todo, .task = task, .user = &all}, .pack = pack, .unpack = unpack};
         for (size_t p = 0; p < all.cut.count; ++p)
             all.todo[p] = all.cut.part[p].colour == colour;
-        OV_TRY(ov_parts_work(context, &all.cut, jobs, &work));
+        OV_TRY(ov_ranks_work(context, parts->ranks, &all.cut, jobs, &work));
         OV_TRY(replace(context, &all));
         count_work(&all, result);
     }

@@ -100,7 +100,7 @@ static bool give_back(yard *y, ov_worker *w, size_t p, ovoid_status status) {
 /* Works on part p with the yard's lock open meanwhile. w: NULL where the caller's context works. */
 static void work_on(yard *y, ovoid_context *context, ov_worker *w, size_t p) {
     const ov_part_work *const work = y->work;
-    const size_t done = y->done;
+    const size_t done = y->done - work->elsewhere;
     y->taken[p] = true;
     if (w)
         w->in_company = ov_crew_on(y->crew, w->device) > 1;
@@ -172,7 +172,7 @@ static void watch(yard *y) {
         until.tv_nsec %= 1000000000;
         pthread_cond_timedwait(&y->changed, &y->lock, &until);
         ovoid_progress told = y->latest;
-        told.done = y->done;
+        told.done = y->done - y->work->elsewhere;
         told.total = y->partition->count;
         const bool over = y->stop || !told.stage;
         pthread_mutex_unlock(&y->lock);

@@ -10,6 +10,7 @@
 
 typedef struct ov_part_work {
     const bool *todo; /* of each part, whether it is to be worked on; NULL: all are */
+    size_t elsewhere; /* of those that are not, how many are not done either: others work on them */
     bool in_turn;     /* a part waits for those near it of earlier colours */
     /* The work itself; `done` parts are. It may read what belongs to parts that it waited for, and
      * changes nothing that others read. */

@@ -149,6 +149,7 @@ PartsOptions = _structure(
     "ovoid_parts_options",
     *((name, c_uint32) for name in ("atoms", "jobs", "resume", "symmetry")),
     ("checkpoint", c_char_p),
+    ("exchange", c_void_p),
 )
 FitOptions = _structure(
     "ovoid_fit_options",

@@ -1,0 +1,93 @@
+# Several ranks of MPI: the file of one process, said and written once, whatever becomes of a rank.
+"$OVOID" --version | grep -q '^with MPI$' || skip "the tool was built without MPI"
+command -v mpirun >/dev/null || skip "no mpirun"
+need_device
+export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+export OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
+export OMPI_MCA_btl_vader_single_copy_mechanism=none # containers forbid it
+unset OVOID_DEVICE
+ranks() { # N COMMAND...
+    number=$1
+    shift
+    run timeout 300 mpirun -n "$number" "$OVOID" "$@"
+}
+once() { [ "$(grep -cF -- "$1" "$2")" -eq 1 ] || fail "it should say once: $1"; }
+make_chain 1600 a.xyzr
+parts="--ratio 0.05 --part-atoms 64 --no-measure"
+
+run "$OVOID" fit a.xyzr -o one.ovoid $parts
+expect_code 0
+for n in 1 2 3 4; do
+    ranks $n fit a.xyzr -o ranks.ovoid $parts
+    expect_code 0
+    expect_silent
+    once "32 parts" "$out"
+    [ $n = 1 ] || once ", $n ranks" "$out"
+    cmp -s one.ovoid ranks.ovoid || fail "$n ranks should make the model that one process makes"
+    rm ranks.ovoid
+done
+make_helix 130 b.xyzr # within a tolerance, in levels, by several workers; measured at the end
+run "$OVOID" fit b.xyzr -o b.ovoid --part-atoms 64 --tolerance 1 --levels 2 -q
+expect_code 0
+ranks 2 fit b.xyzr -o c.ovoid --part-atoms 64 --tolerance 1 --levels 2 --jobs 2 --report r.json
+expect_code 0
+cmp -s b.ovoid c.ovoid || fail "two ranks should make the model that one process makes"
+cmp -s b.level2.ovoid c.level2.ovoid || fail "the second level should be the same, too"
+rm [bc].*ovoid r.json
+
+# What cannot be shared rank 0 does alone.
+ranks 3 fit b.xyzr --tolerance 1 --no-measure
+expect_code 0
+once "rank 0 of 3 works alone" "$err"
+once "--part-atoms" "$err"
+once "written to b.ovoid" "$out"
+ranks 3 fit b.xyzr --method l1 --iterations 10 -o d.ovoid --no-measure
+expect_code 0
+once "method l1 has no parts" "$err"
+ranks 2 measure b.xyzr b.ovoid
+expect_code 0
+once "Hausdorff" "$out"
+rm b.ovoid d.ovoid
+
+# Failures are told once, whoever's they are.
+ranks 3 fit nothing.xyzr
+expect_code 3
+once "nothing.xyzr" "$err"
+ranks 2 fit a.xyzr --part-atoms 10
+expect_code 2
+once "parts.atoms" "$err"
+ranks 2 fit a.xyzr $parts --device 0,nothing
+expect_code 5
+once "ovoid: error: rank 1: " "$err"
+expect_err "nothing"
+ranks 3 fit a.xyzr $parts --checkpoint nowhere/c
+expect_code 4
+once "rank 0: nowhere/c" "$err"
+ranks 2 fit a.xyzr --part-atoms 64 --no-measure --time-limit 0.001
+expect_code 10
+once "no model held" "$err"
+expect_files a.xyzr b.xyzr one.ovoid
+
+# A rank is killed when there is another part on file, once each; then the others go on for them.
+size_of() { wc -c <"$1" 2>/dev/null || echo 0; }
+process_of() { # RANK, of the mpirun $pid
+    for child in $(cat /proc/$pid/task/*/children 2>/dev/null); do
+        tr '\0' '\n' <"/proc/$child/environ" 2>/dev/null | grep -qx "OMPI_COMM_WORLD_RANK=$1" && echo "$child"
+    done
+}
+last="mpirun -n 3 ovoid fit with a checkpoint, one rank killed after the other"
+size=0
+for victim in 0 1 2; do
+    mpirun -n 3 "$OVOID" fit a.xyzr -o two.ovoid $parts -q --checkpoint c --resume >"$out" 2>"$err" </dev/null &
+    pid=$!
+    while [ "$(size_of c)" -le "$size" ] && kill -0 $pid 2>/dev/null; do sleep 0.01; done
+    kill -s KILL $(process_of $victim) || fail "rank $victim had ended before it could be killed"
+    finish
+    [ "$code" -ne 0 ] || fail "mpirun should tell that a rank has died"
+    [ ! -e two.ovoid ] || fail "there should be no model after a kill"
+    size=$(size_of c)
+done
+ranks 2 fit a.xyzr -o two.ovoid $parts -q --checkpoint c --resume
+expect_code 0
+cmp -s one.ovoid two.ovoid || fail "ranks that were killed should come to the same model"
+expect_files a.xyzr b.xyzr one.ovoid two.ovoid

@@ -1,0 +1,443 @@
+/*
+ * Fits that several ranks share (host/fit/parts/ranks.c), without MPI: threads of this process are
+ * the ranks, and what they exchange goes through its memory.
+ */
+#include "fit/parts/patch.h"
+#include "measure/survey.h"
+#include "support.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { RANKS_MOST = 3 };
+
+/* ---- an exchange in memory ------------------------------------------------------------------- */
+
+typedef struct hall {
+    pthread_barrier_t barrier;
+    uint32_t ranks;
+    const void *said[RANKS_MOST];
+    uint32_t gathers, breaks_at; /* 0: never */
+} hall;
+
+/* One of the ranks, with what it is to do and what came of it. */
+typedef struct rank {
+    hall *hall;
+    ovoid_exchange exchange;
+    ovoid_context *context;
+    const ovoid_molecule *molecule;
+    ovoid_fit_options options;
+    pthread_t thread;
+    uint32_t fits;       /* parts that it has fitted */
+    uint32_t fails_at;   /* its so many-th fit of a part fails; 0: none does */
+    uint32_t stops_at;   /* or its progress callback stops from there on */
+    bool fails_to_join;  /* its surveys */
+    bool told_late;      /* of more parts done than there are, or than before */
+    uint64_t done;       /* parts, as its callback was told, at most */
+    ovoid_status status; /* and what the fit came to */
+    ovoid_model *model;
+    ovoid_fit_result result;
+} rank;
+
+static rank *rank_of(const ovoid_context *context, rank *ranks, size_t count) {
+    for (size_t n = 0; n < count; ++n)
+        if (ranks[n].context == context)
+            return &ranks[n];
+    return NULL;
+}
+
+static int gather(const void *mine, void *all, const uint64_t *sizes, void *user) {
+    const rank *const r = user;
+    hall *const h = r->hall;
+    unsigned char *to = all;
+    h->said[r->exchange.rank] = mine;
+    if (r->exchange.rank == 0)
+        ++h->gathers;
+    pthread_barrier_wait(&h->barrier);
+    const bool broken = h->gathers == h->breaks_at;
+    for (uint32_t n = 0; n < h->ranks && !broken; to += sizes[n++])
+        if (sizes[n] > 0)
+            memcpy(to, h->said[n], (size_t)sizes[n]);
+    pthread_barrier_wait(&h->barrier);
+    return broken ? 17 : 0;
+}
+
+/* ---- ranks that fail ------------------------------------------------------------------------- */
+
+static rank all_ranks[RANKS_MOST];
+
+ovoid_status __real_ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
+                                      size_t done, ov_part_fit *fit);
+ovoid_status __wrap_ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
+                                      size_t done, ov_part_fit *fit);
+ovoid_status __wrap_ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
+                                      size_t done, ov_part_fit *fit) {
+    rank *const r = rank_of(context, all_ranks, RANKS_MOST);
+    if (r && ++r->fits == r->fails_at)
+        return ov_fail(context, OVOID_ERROR_NUMERIC, "made to fail");
+    return __real_ov_part_fit_atoms(context, parts, p, done, fit);
+}
+
+ovoid_status __real_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
+                                   size_t count, double apart, ov_survey_total *total);
+ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
+                                   size_t count, double apart, ov_survey_total *total);
+ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
+                                   size_t count, double apart, ov_survey_total *total) {
+    const rank *const r = rank_of(context, all_ranks, RANKS_MOST);
+    if (r && r->fails_to_join)
+        return ov_fail(context, OVOID_ERROR_NUMERIC, "made to fail behind the others' backs");
+    return __real_ov_survey_join(context, cells, count, apart, total);
+}
+
+static atomic_uint patches; /* rounds of mending, of all ranks */
+
+ovoid_status __real_ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t jobs,
+                                    const ov_spot *spots, size_t count, ov_box **touched,
+                                    size_t *touched_count, ovoid_fit_result *result);
+ovoid_status __wrap_ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t jobs,
+                                    const ov_spot *spots, size_t count, ov_box **touched,
+                                    size_t *touched_count, ovoid_fit_result *result);
+ovoid_status __wrap_ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t jobs,
+                                    const ov_spot *spots, size_t count, ov_box **touched,
+                                    size_t *touched_count, ovoid_fit_result *result) {
+    ++patches;
+    return __real_ov_patches_mend(context, parts, jobs, spots, count, touched, touched_count,
+                                  result);
+}
+
+static bool on_progress(const ovoid_progress *progress, void *user) {
+    rank *const r = user;
+    if (progress->method == OVOID_METHOD_ADAPTIVE && progress->total != OVOID_UNKNOWN) {
+        r->told_late = r->told_late || progress->done > progress->total;
+        r->done = progress->done > r->done ? progress->done : r->done;
+    }
+    return r->stops_at == 0 || r->fits < r->stops_at;
+}
+
+/* ---- fits ------------------------------------------------------------------------------------ */
+
+/* Atoms in a box of so much room across, angstrom, as dense as a protein's with hydrogens. */
+static ovoid_molecule *box(ovoid_context *context, size_t atoms, double across) {
+    double *const xyzr = test_alloc(4 * atoms, sizeof *xyzr);
+    test_random random = {11};
+    const double length = 10.0 * (double)atoms / (across * across);
+    for (size_t i = 0; i < atoms; ++i) {
+        for (size_t k = 0; k < 3; ++k)
+            xyzr[4 * i + k] = random_uniform(&random, 0.0, k == 0 ? length : across);
+        xyzr[4 * i + 3] = random_uniform(&random, 1.2, 1.8);
+    }
+    ovoid_molecule *molecule = NULL;
+    test_check(context, ovoid_molecule_create(context, xyzr, atoms, &molecule));
+    free(xyzr);
+    return molecule;
+}
+
+/* Long, so that many parts may be fitted at a time. */
+static ovoid_molecule *rod(ovoid_context *context, size_t atoms) {
+    return box(context, atoms, 5.0);
+}
+
+static ovoid_fit_options in_parts(uint32_t atoms) {
+    ovoid_fit_options options;
+    ovoid_fit_options_init(&options, sizeof options);
+    options.parts.atoms = atoms;
+    return options;
+}
+
+static hall one_hall;
+
+/* Ranks 0 to count - 1 of all_ranks, ready to be told what each is to do. */
+static void gather_ranks(uint32_t count, const ovoid_molecule *molecule,
+                         const ovoid_fit_options *options) {
+    one_hall = (hall){.ranks = count};
+    assert_int_equal(pthread_barrier_init(&one_hall.barrier, NULL, count), 0);
+    for (uint32_t n = 0; n < count; ++n) {
+        rank *const r = &all_ranks[n];
+        *r = (rank){.hall = &one_hall, .molecule = molecule, .options = *options};
+        r->exchange = (ovoid_exchange){.rank = n, .ranks = count, .gather = gather, .user = r};
+        r->options.parts.exchange = &r->exchange;
+        assert_int_equal(ovoid_context_create(&r->context), OVOID_OK);
+        ovoid_context_on_progress(r->context, on_progress, r);
+        ovoid_fit_result_init(&r->result, sizeof r->result);
+    }
+}
+
+static void *run(void *user) {
+    rank *const r = user;
+    r->status = ovoid_fit(r->context, r->molecule, &r->options, &r->model, &r->result);
+    return NULL;
+}
+
+static void run_ranks(void) {
+    for (uint32_t n = 0; n < one_hall.ranks; ++n)
+        assert_int_equal(pthread_create(&all_ranks[n].thread, NULL, run, &all_ranks[n]), 0);
+    for (uint32_t n = 0; n < one_hall.ranks; ++n)
+        pthread_join(all_ranks[n].thread, NULL);
+}
+
+static void dismiss_ranks(void) {
+    for (uint32_t n = 0; n < one_hall.ranks; ++n) {
+        assert_false(all_ranks[n].told_late);
+        ovoid_model_destroy(&all_ranks[n].model);
+        ovoid_context_destroy(&all_ranks[n].context);
+    }
+    pthread_barrier_destroy(&one_hall.barrier);
+    memset(all_ranks, 0, sizeof all_ranks);
+}
+
+static void expect_same(const ovoid_model *a, const ovoid_model *b) {
+    assert_non_null(b);
+    assert_int_equal(ovoid_model_size(a), ovoid_model_size(b));
+    assert_memory_equal(ovoid_model_ellipsoids(a), ovoid_model_ellipsoids(b),
+                        ovoid_model_size(a) * sizeof(ovoid_ellipsoid));
+    assert_int_equal(ovoid_model_owner_count(a), ovoid_model_owner_count(b));
+    assert_memory_equal(ovoid_model_owner(a), ovoid_model_owner(b),
+                        ovoid_model_owner_count(a) * sizeof(uint32_t));
+}
+
+static void expect_all(ovoid_status status, const char *text) {
+    for (uint32_t n = 0; n < one_hall.ranks; ++n) {
+        test_refused(all_ranks[n].context, all_ranks[n].status, status, text);
+        if (status != OVOID_ERROR_CANCELLED)
+            assert_null(all_ranks[n].model);
+    }
+}
+
+static uint32_t all_fits(void) {
+    uint32_t fits = 0;
+    for (uint32_t n = 0; n < one_hall.ranks; ++n)
+        fits += all_ranks[n].fits;
+    return fits;
+}
+
+static void expect_models(const ovoid_model *model, const ovoid_fit_result *result) {
+    for (uint32_t n = 0; n < one_hall.ranks; ++n) {
+        const rank *const r = &all_ranks[n];
+        test_check(r->context, r->status);
+        expect_same(model, r->model);
+        assert_int_equal(r->result.parts, result->parts);
+        assert_int_equal(r->result.iterations, result->iterations);
+        assert_int_equal(r->result.points, result->points);
+        assert_int_equal(r->result.verdict, result->verdict);
+        assert_true(r->result.distance == result->distance);
+    }
+}
+
+/* ---- one model ------------------------------------------------------------------------------- */
+
+/* The bits of one process, each part fitted by one rank alone, and none idle. */
+static void all_ranks_come_to_the_model_of_one(void **state) {
+    ovoid_molecule *molecule = rod(*state, test_size(500, 300));
+    ovoid_fit_options options = in_parts(64);
+    ovoid_fit_result result;
+    ovoid_model *model = NULL;
+    test_skip_simulated(*state);
+    ovoid_fit_result_init(&result, sizeof result);
+    test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    for (uint32_t ranks = 1; ranks <= RANKS_MOST; ++ranks) {
+        gather_ranks(ranks, molecule, &options);
+        run_ranks();
+        expect_models(model, &result);
+        assert_int_equal(all_fits(), result.parts);
+        for (uint32_t n = 0; n < ranks; ++n) {
+            assert_in_range(all_ranks[n].fits, result.parts / ranks / 2, result.parts);
+            assert_in_range(all_ranks[n].done, result.parts / 2, result.parts);
+        }
+        dismiss_ranks();
+    }
+    gather_ranks(2, molecule, &options); /* with workers of their own, not as many on each */
+    all_ranks[0].options.parts.jobs = 3;
+    run_ranks();
+    expect_models(model, &result);
+    dismiss_ranks();
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Where all parts are near each other, and the seams have to be mended. */
+static void seams_are_mended_by_all(void **state) {
+    ovoid_molecule *molecule = box(*state, 250, cbrt(2500.0));
+    ovoid_fit_options options = in_parts(64);
+    ovoid_fit_result result;
+    ovoid_model *model = NULL;
+    test_skip_simulated(*state);
+    options.adaptive.tolerance = 1.0;
+    ovoid_fit_result_init(&result, sizeof result);
+    test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    patches = 0;
+    gather_ranks(2, molecule, &options);
+    run_ranks();
+    expect_models(model, &result);
+    dismiss_ranks();
+    assert_true(patches > 0);
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void numbers_of_ellipsoids_are_those_of_one(void **state) {
+    ovoid_molecule *molecule = rod(*state, 300);
+    ovoid_fit_options options = in_parts(64);
+    ovoid_fit_result result;
+    ovoid_model *model = NULL;
+    test_skip_simulated(*state);
+    options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+    options.adaptive.ellipsoids = 40;
+    ovoid_fit_result_init(&result, sizeof result);
+    test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    gather_ranks(3, molecule, &options);
+    run_ranks();
+    expect_models(model, &result);
+    dismiss_ranks();
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* What is not cut into parts each rank fits by itself; those that meet are told of differences. */
+static void one_part_is_fitted_by_each(void **state) {
+    ovoid_molecule *molecule = rod(*state, 60);
+    ovoid_fit_options options = in_parts(0);
+    ovoid_fit_result result;
+    ovoid_model *model = NULL;
+    test_skip_simulated(*state);
+    ovoid_fit_result_init(&result, sizeof result);
+    test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    gather_ranks(2, molecule, &options);
+    run_ranks();
+    expect_models(model, &result);
+    dismiss_ranks();
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- what is refused ------------------------------------------------------------------------- */
+
+static void different_fits_are_refused(void **state) {
+    ovoid_molecule *molecule = rod(*state, 300), *other = rod(*state, 301);
+    const ovoid_fit_options options = in_parts(64);
+    test_skip_simulated(*state);
+    gather_ranks(3, molecule, &options);
+    all_ranks[1].options.adaptive.tolerance = 0.4;
+    run_ranks();
+    expect_all(OVOID_ERROR_ARGUMENT, "rank 1 has other options");
+    dismiss_ranks();
+    gather_ranks(2, molecule, &options);
+    all_ranks[1].molecule = other;
+    run_ranks();
+    expect_all(OVOID_ERROR_ARGUMENT, "rank 1 has other atoms");
+    dismiss_ranks();
+    gather_ranks(2, molecule, &options);
+    all_ranks[1].options.parts.atoms = 0;
+    run_ranks();
+    expect_all(OVOID_ERROR_ARGUMENT, "rank 1 has other options of parts");
+    assert_int_equal(all_fits(), 0);
+    dismiss_ranks();
+    ovoid_molecule_destroy(&molecule);
+    ovoid_molecule_destroy(&other);
+}
+
+static void exchanges_that_are_none_are_refused(void **state) {
+    ovoid_molecule *molecule = rod(*state, 100);
+    ovoid_fit_options options = in_parts(64);
+    ovoid_exchange exchange = {.rank = 1, .ranks = 1, .gather = gather};
+    ovoid_model *none = NULL;
+    test_skip_simulated(*state);
+    options.parts.exchange = &exchange;
+    test_refused(*state, ovoid_fit(*state, molecule, &options, &none, NULL), OVOID_ERROR_ARGUMENT,
+                 "a rank below the number of ranks, 1; it is 1");
+    exchange = (ovoid_exchange){.rank = 0, .ranks = 1};
+    test_refused(*state, ovoid_fit(*state, molecule, &options, &none, NULL), OVOID_ERROR_ARGUMENT,
+                 "no function");
+    assert_null(none);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* ---- failures -------------------------------------------------------------------------------- */
+
+static void a_failure_ends_it_on_all(void **state) {
+    ovoid_molecule *molecule = rod(*state, 300);
+    ovoid_fit_options options = in_parts(64);
+    test_skip_simulated(*state);
+    gather_ranks(3, molecule, &options);
+    all_ranks[1].fails_at = 2; /* at a part */
+    run_ranks();
+    expect_all(OVOID_ERROR_NUMERIC, "rank 1: made to fail");
+    dismiss_ranks();
+    gather_ranks(3, molecule, &options);
+    all_ranks[2].fails_to_join = true; /* at what all do, while the others go on */
+    run_ranks();
+    expect_all(OVOID_ERROR_NUMERIC, "rank 2: made to fail behind");
+    dismiss_ranks();
+    gather_ranks(2, molecule, &options);
+    one_hall.breaks_at = 6; /* the exchange itself */
+    run_ranks();
+    expect_all(OVOID_ERROR_IO, "the exchange with the other ranks failed (17)");
+    dismiss_ranks();
+    options.parts.checkpoint = "/nowhere/at/all"; /* a file, on rank 0 */
+    gather_ranks(2, molecule, &options);
+    run_ranks();
+    expect_all(OVOID_ERROR_IO, "rank 0: /nowhere/at/all");
+    assert_int_equal(all_fits(), 0);
+    dismiss_ranks();
+    ovoid_molecule_destroy(&molecule);
+}
+
+static long length_of(const char *path) {
+    struct stat info;
+    return stat(path, &info) == 0 ? (long)info.st_size : -1;
+}
+
+/* One that is stopped stops all, with the same model of what was done; and rank 0 goes on from the
+ * checkpoint for all, however many there are then. */
+static void a_stop_stops_all_and_they_resume(void **state) {
+    ovoid_molecule *molecule = rod(*state, 400);
+    ovoid_fit_options options = in_parts(64);
+    ovoid_fit_result result;
+    ovoid_model *model = NULL;
+    char path[300];
+    const char *const place = getenv("TMPDIR");
+    test_skip_simulated(*state);
+    snprintf(path, sizeof path, "%.200s/ovoid-ranks-%ld", place ? place : "/tmp", (long)getpid());
+    unlink(path);
+    ovoid_fit_result_init(&result, sizeof result);
+    test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    options.parts.checkpoint = path;
+    gather_ranks(2, molecule, &options);
+    all_ranks[1].stops_at = 2; /* it has done one */
+    run_ranks();
+    expect_all(OVOID_ERROR_CANCELLED, "rank 1: ");
+    assert_non_null(all_ranks[0].model);
+    expect_same(all_ranks[0].model, all_ranks[1].model);
+    assert_true(length_of(path) > 1000);
+    dismiss_ranks();
+    options.parts.resume = 1;
+    gather_ranks(3, molecule, &options);
+    run_ranks();
+    expect_models(model, &result);
+    assert_in_range(all_fits(), 1, result.parts - 1);
+    dismiss_ranks();
+    gather_ranks(2, molecule, &options); /* all of them are there */
+    run_ranks();
+    expect_models(model, &result);
+    assert_int_equal(all_fits(), 0);
+    dismiss_ranks();
+    unlink(path);
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(all_ranks_come_to_the_model_of_one),
+        cmocka_unit_test(seams_are_mended_by_all),
+        cmocka_unit_test(numbers_of_ellipsoids_are_those_of_one),
+        cmocka_unit_test(one_part_is_fitted_by_each),
+        cmocka_unit_test(different_fits_are_refused),
+        cmocka_unit_test(exchanges_that_are_none_are_refused),
+        cmocka_unit_test(a_failure_ends_it_on_all),
+        cmocka_unit_test(a_stop_stops_all_and_they_resume),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -3,6 +3,8 @@
  * of one unit among its images that stand for all of them.
  */
 #include "base/rigid.h"
+#include "field/quadric.h"
+#include "measure/survey.h"
 #include "molecule/symmetry.h"
 #include "support.h"
 
@@ -124,6 +126,75 @@ static void units_of_several_placements_are_found(void **state) {
     expect_symmetry(*state, of, 4, 1, 4);
     of[0] = of[1] = ov_rigid_identity; /* the same twice is no symmetry */
     expect_symmetry(*state, of, 2, 0, 0);
+}
+
+/* ---- surveys --------------------------------------------------------------------------------- */
+
+/* Surveys the unit of a ring of `order` among its images; the model is the atoms a little shifted.
+ */
+static void survey_unit(ovoid_context *context, const ovoid_molecule *molecule,
+                        const ov_rigid *motions, size_t order, ov_survey_total *total) {
+    const size_t unit = ovoid_molecule_unit_atoms(molecule);
+    const double low[3] = {-INFINITY, -INFINITY, -INFINITY},
+                 high[3] = {INFINITY, INFINITY, INFINITY};
+    const double centre[3] = {0.0, 0.0, 0.0};
+    ov_quadric *const original = test_alloc(order * unit, sizeof *original);
+    ov_quadric *const model = test_alloc(order * unit, sizeof *model);
+    uint32_t *const image = test_alloc(order * unit, sizeof *image);
+    ov_survey_cell cell = {0};
+    for (size_t n = 0; n < order * unit; ++n) {
+        ov_quadric atom;
+        image[n] = (uint32_t)(n / unit);
+        ov_quadric_of_atom(ovoid_molecule_unit_xyzr(molecule) + 4 * (n % unit), 0.5, &atom);
+        ov_quadric_move(&atom, &motions[n / unit], &original[n]);
+        atom.centre[n % unit % 3] += 0.4 * sin((double)(n % unit));
+        ov_quadric_move(&atom, &motions[n / unit], &model[n]);
+    }
+    const ov_survey_options options = {
+        .isovalue = 1.0, .spacing = 0.5, .least = INFINITY, .image = image};
+    const ov_survey_images images = {
+        .image = motions, .count = order, .spacing = 0.5, .centre = centre};
+    test_check(context, ov_survey(context, &options, original, order * unit, model, order * unit,
+                                  low, high, &cell));
+    test_check(context, ov_survey_join(context, &cell, 1, &images, 3.0, total));
+    ov_survey_cell_destroy(&cell);
+    free(original);
+    free(model);
+    free(image);
+}
+
+/* So many units are the whole, but for the lattice that each is meshed on: what is outer, and which
+ * cavities there are, is known across the seams. */
+static void units_add_up(void **state) {
+    const ov_rigid of[3] = {screw(0.0, 0.0), screw(1.0 / 3.0, 0.0), screw(2.0 / 3.0, 0.0)};
+    ovoid_molecule *molecule = assembly(*state, 400, 8.0, 0.0, 50.0, of, 3);
+    ov_survey_total total = {0};
+    ovoid_field *field = NULL;
+    ovoid_measure_options options;
+    ovoid_measures whole;
+    ovoid_measure_options_init(&options, sizeof options);
+    ovoid_measures_init(&whole, sizeof whole);
+    test_skip_simulated(*state);
+    survey_unit(*state, molecule, of, 3, &total);
+    test_check(*state, ovoid_field_of_molecule(*state, molecule, 0.5, 1.0, &field));
+    test_check(*state, ovoid_measure(*state, field, field, &options, &whole));
+    print_message("outer area %g of %g, outer volume %g of %g, %llu pieces of %llu\n",
+                  3.0 * total.area_outer[0], whole.area_outer.original, 3.0 * total.volume_outer[0],
+                  whole.volume_outer.original, (unsigned long long)total.components[0],
+                  (unsigned long long)whole.components_original);
+    assert_int_equal(whole.outer_original, 1);
+    assert_true(whole.components_original > 3);
+    expect_near(3.0 * total.area[0], whole.area.original, 2e-3 * whole.area.original, "area");
+    expect_near(3.0 * total.volume[0], whole.volume.original, 2e-3 * whole.volume.original,
+                "volume");
+    expect_near(3.0 * total.area_outer[0], whole.area_outer.original,
+                2e-3 * whole.area_outer.original, "outer area");
+    expect_near(3.0 * total.volume_outer[0], whole.volume_outer.original,
+                2e-3 * whole.volume_outer.original, "outer volume");
+    assert_int_equal(total.outer[0], 1);
+    ov_survey_total_destroy(&total);
+    ovoid_field_destroy(&field);
+    ovoid_molecule_destroy(&molecule);
 }
 
 /* ---- fits ------------------------------------------------------------------------------------ */
@@ -261,6 +332,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(groups_are_found),
         cmocka_unit_test(units_of_several_placements_are_found),
+        cmocka_unit_test(units_add_up),
         cmocka_unit_test(units_stand_for_all),
         cmocka_unit_test(numbers_are_those_asked_for),
         cmocka_unit_test(sessions_go_on_with_all_atoms),

@@ -81,15 +81,18 @@ ovoid_status __wrap_ov_part_fit_atoms(ovoid_context *context, const ov_parts *pa
 }
 
 ovoid_status __real_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
-                                   size_t count, double apart, ov_survey_total *total);
+                                   size_t count, const ov_survey_images *images, double apart,
+                                   ov_survey_total *total);
 ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
-                                   size_t count, double apart, ov_survey_total *total);
+                                   size_t count, const ov_survey_images *images, double apart,
+                                   ov_survey_total *total);
 ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
-                                   size_t count, double apart, ov_survey_total *total) {
+                                   size_t count, const ov_survey_images *images, double apart,
+                                   ov_survey_total *total) {
     const rank *const r = rank_of(context, all_ranks, RANKS_MOST);
     if (r && r->fails_to_join)
         return ov_fail(context, OVOID_ERROR_NUMERIC, "made to fail behind the others' backs");
-    return __real_ov_survey_join(context, cells, count, apart, total);
+    return __real_ov_survey_join(context, cells, count, images, apart, total);
 }
 
 static atomic_uint patches; /* rounds of mending, of all ranks */
@@ -277,6 +280,61 @@ static void seams_are_mended_by_all(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* A PQR file of a rod beside the z axis, with an assembly of it and half a turn of it. */
+static ovoid_molecule *pair(ovoid_context *context) {
+    char path[300];
+    const char *const place = getenv("TMPDIR");
+    ovoid_read_options options;
+    ovoid_molecule *molecule = NULL, *unit = rod(context, 200);
+    const double *const xyzr = ovoid_molecule_xyzr(unit);
+    snprintf(path, sizeof path, "%.200s/ovoid-ranks-%ld.pqr", place ? place : "/tmp",
+             (long)getpid());
+    FILE *const file = fopen(path, "w");
+    assert_non_null(file);
+    fprintf(file, "REMARK 350 BIOMOLECULE: 1\nREMARK 350 APPLY THE FOLLOWING TO CHAINS: A\n");
+    for (int p = 1; p <= 2; ++p)
+        for (int k = 0; k < 3; ++k)
+            fprintf(file, "REMARK 350   BIOMT%d %3d %9.6f %9.6f %9.6f %14.5f\n", k + 1, p,
+                    k == 0 ? 3.0 - 2.0 * p : 0.0, k == 1 ? 3.0 - 2.0 * p : 0.0, k == 2 ? 1.0 : 0.0,
+                    0.0);
+    for (size_t i = 0; i < 200; ++i)
+        fprintf(file, "ATOM  %5zu  C   ALA A %3zu    %8.3f %8.3f %8.3f %6.3f %6.3f\n", i + 1,
+                i / 8 + 1, xyzr[4 * i], xyzr[4 * i + 1] + 1.0, xyzr[4 * i + 2], 0.0,
+                xyzr[4 * i + 3]);
+    fclose(file);
+    ovoid_read_options_init(&options, sizeof options);
+    options.assembly = "1";
+    test_check(context, ovoid_molecule_read_with(context, path, &options, &molecule));
+    unlink(path);
+    ovoid_molecule_destroy(&unit);
+    return molecule;
+}
+
+/* One unit of an assembly is fitted for all, and its pieces go on in images of it. */
+static void units_are_those_of_one(void **state) {
+    ovoid_molecule *molecule = pair(*state);
+    ovoid_fit_options options = in_parts(64);
+    ovoid_fit_result result;
+    ovoid_model *model = NULL;
+    test_skip_simulated(*state);
+    ovoid_fit_result_init(&result, sizeof result);
+    test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    assert_int_equal(result.units, 2);
+    assert_in_range(result.parts, 3, 8);
+    gather_ranks(2, molecule, &options);
+    run_ranks();
+    expect_models(model, &result);
+    assert_int_equal(all_ranks[1].result.units, 2);
+    dismiss_ranks();
+    gather_ranks(2, molecule, &options);
+    all_ranks[1].options.parts.symmetry = OVOID_SYMMETRY_IGNORE;
+    run_ranks();
+    expect_all(OVOID_ERROR_ARGUMENT, "rank 1 has other");
+    dismiss_ranks();
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
+}
+
 static void numbers_of_ellipsoids_are_those_of_one(void **state) {
     ovoid_molecule *molecule = rod(*state, 300);
     ovoid_fit_options options = in_parts(64);
@@ -432,6 +490,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_ranks_come_to_the_model_of_one),
         cmocka_unit_test(seams_are_mended_by_all),
+        cmocka_unit_test(units_are_those_of_one),
         cmocka_unit_test(numbers_of_ellipsoids_are_those_of_one),
         cmocka_unit_test(one_part_is_fitted_by_each),
         cmocka_unit_test(different_fits_are_refused),

@@ -20,25 +20,28 @@ static bool was_launched(void) {
     return false;
 }
 
-static uint32_t local_rank(void) {
+static void look_around(mpi_place *place) {
     MPI_Comm node;
-    int rank;
+    int rank, ranks;
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node);
     MPI_Comm_rank(node, &rank);
+    MPI_Comm_size(node, &ranks);
     MPI_Comm_free(&node);
-    return (uint32_t)rank;
+    place->local = (uint32_t)rank;
+    place->locals = (uint32_t)ranks;
 }
 
 void mpi_begin(int *argc, char ***argv, mpi_place *place) {
     int threads, rank, ranks;
-    *place = (mpi_place){.ranks = 1};
+    *place = (mpi_place){.ranks = 1, .locals = 1};
     if (!was_launched())
         return;
     MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &threads);
     MPI_Comm_rank(MPI_COMM_WORLD, &rank);
     MPI_Comm_size(MPI_COMM_WORLD, &ranks);
     running = true;
-    *place = (mpi_place){(uint32_t)rank, (uint32_t)ranks, local_rank()};
+    *place = (mpi_place){.rank = (uint32_t)rank, .ranks = (uint32_t)ranks};
+    look_around(place);
 }
 
 void mpi_end(void) {

@@ -10,7 +10,7 @@
 
 typedef struct mpi_place {
     uint32_t rank, ranks;
-    uint32_t local; /* of the ranks on this node, from 0 */
+    uint32_t local, locals; /* of the ranks on this node, from 0, and how many these are */
 } mpi_place;
 
 /* Starts MPI if a launcher has started the program, else there is one rank. Once. */

@@ -111,6 +111,12 @@ const char *ranks_device(ovoid_context *context, const char *asked) {
         asked = getenv("OVOID_DEVICE");
     if (!asked || !asked[0])
         return turn_of(context, &gpu, text) ? text : NULL;
+    const bool several =
+        strchr(asked, ',') || strcmp(asked, "all") == 0 || strcmp(asked, "gpus") == 0;
+    if (several && place.locals == 1)
+        return asked; /* all of them */
+    if (strcmp(asked, "gpus") == 0)
+        return turn_of(context, &gpu, text) ? text : asked;
     if (strchr(asked, ',')) {
         item_of(asked, text);
         return text;

@@ -306,12 +306,14 @@ static uint64_t hash_start(const ov_found *start) {
     return start->count > 0 ? ov_hash(start->quadrics, start->count * sizeof *start->quadrics) : 0;
 }
 
+/* Of a symmetric assembly by its unit: all atoms may be there on some ranks alone. */
 static ovoid_status meet_ranks(const ovoid_fitter *fitter, const ovoid_fit_options *options,
                                ov_ranks *ranks) {
-    const bool by_unit = is_fitted_by_unit(fitter, options);
-    const double *const xyzr = by_unit || !fitter->xyzr ? fitter->unit : fitter->xyzr;
-    const size_t atoms = xyzr == fitter->unit ? fitter->symmetry.unit_atoms : fitter->atoms;
-    return ov_ranks_begin(fitter->context, options, xyzr, atoms, hash_start(&fitter->start), ranks);
+    const ov_symmetry *const symmetry = &fitter->symmetry;
+    const bool by_unit = symmetry->order > 0;
+    const uint64_t start = hash_start(&fitter->start) ^ (by_unit ? symmetry->order : 0);
+    return ov_ranks_begin(fitter->context, options, by_unit ? fitter->unit : fitter->xyzr,
+                          by_unit ? symmetry->unit_atoms : fitter->atoms, start, ranks);
 }
 
 static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, double began,

@@ -98,11 +98,10 @@ typedef struct ov_survey_options {
     uint32_t cell;   /* its number, for what is far */
     double *meshing; /* gets the seconds that meshes take, too; NULL: nobody asks */
     /* Where what is surveyed is the unit of a symmetric assembly: of which image of the unit each
-     * term of the original is, 0 of itself, and where the axes meet. A place of either surface
+     * term of the original is, 0 of itself. A place of either surface
      * belongs to the image of the original's largest term there, and what belongs to others than
      * the unit itself is left to their own survey. NULL: all is surveyed. */
     const uint32_t *image;
-    const double *centre;
 } ov_survey_options;
 
 /* Beyond the halo, in steps of the lattice. */

@@ -90,10 +90,8 @@ ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_
     ov_scene scene = {0};
     ov_quadric *original = NULL;
     OV_TRY(ov_scene_of_cell(context, parts, p, &scene));
-    if (parts->centre) {
+    if (parts->centre)
         wanted.image = scene.image;
-        wanted.centre = parts->centre;
-    }
     original = ov_alloc(context, scene.atoms, sizeof *original, "atoms");
     if (!original) {
         status = OVOID_ERROR_MEMORY;

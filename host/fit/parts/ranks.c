@@ -192,7 +192,7 @@ static hello hello_of(const ovoid_fit_options *options, const double *xyzr, size
                    .version = ov_hash(ovoid_version(), strlen(ovoid_version())),
                    .input = ov_hash(xyzr, 4 * atoms * sizeof *xyzr),
                    .options = ov_fit_options_hash(options),
-                   .parts = options->parts.atoms,
+                   .parts = options->parts.atoms | (uint64_t)options->parts.symmetry << 32,
                    .start = start,
                    .keeps = options->parts.checkpoint != NULL,
                    .jobs = options->parts.jobs > 1 ? options->parts.jobs : 1};

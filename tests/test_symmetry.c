@@ -167,7 +167,7 @@ static void survey_unit(ovoid_context *context, const ovoid_molecule *molecule,
  * cavities there are, is known across the seams. */
 static void units_add_up(void **state) {
     const ov_rigid of[3] = {screw(0.0, 0.0), screw(1.0 / 3.0, 0.0), screw(2.0 / 3.0, 0.0)};
-    ovoid_molecule *molecule = assembly(*state, 400, 8.0, 0.0, 50.0, of, 3);
+    ovoid_molecule *molecule = assembly(*state, 700, 11.0, 0.0, 50.0, of, 3);
     ov_survey_total total = {0};
     ovoid_field *field = NULL;
     ovoid_measure_options options;
@@ -183,7 +183,7 @@ static void units_add_up(void **state) {
                   whole.volume_outer.original, (unsigned long long)total.components[0],
                   (unsigned long long)whole.components_original);
     assert_int_equal(whole.outer_original, 1);
-    assert_true(whole.components_original > 3);
+    assert_true(whole.components_original > 1);
     expect_near(3.0 * total.area[0], whole.area.original, 2e-3 * whole.area.original, "area");
     expect_near(3.0 * total.volume[0], whole.volume.original, 2e-3 * whole.volume.original,
                 "volume");

@@ -52,6 +52,20 @@ run "$OVOID" mesh a.pdb --assembly 7 -o a.ply
 expect_code 2
 expect_err "a.pdb: no assembly 7: the file has 1"
 
+# Its two placements turn into each other: one is fitted for both, unless that is not wanted.
+run "$OVOID" fit a.pdb --assembly 1 --ellipsoids 4 --no-measure -o b.ovoid --report b.json
+expect_code 0
+expect_out "one of 2 units"
+grep -qF '"units":	2' b.json || fail "the report should tell of 2 units"
+grep -q "^# .*units 2" b.ovoid || fail "the model should tell of 2 units"
+[ "$(grep -vc '^#' b.ovoid)" = 4 ] || fail "4 ellipsoids should be there"
+for option in "--ellipsoids 3" "--ellipsoids 4 --no-symmetry"; do
+    run "$OVOID" fit a.pdb --assembly 1 $option --no-measure -o b.ovoid --report b.json
+    expect_code 0
+    grep -qF '"units":	1' b.json || fail "all atoms should be fitted with $option"
+done
+rm -f b.ovoid b.json
+
 for command in "measure a.pdb a.ovoid --report b.json" "render a.pdb a.ovoid -o a.png --size 64x48" \
     "export a.pdb -o a.dx"; do
     run "$OVOID" $command --radii bondi

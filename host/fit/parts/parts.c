@@ -297,19 +297,12 @@ static void choose_touched(job *j, const ov_box *touched, size_t count) {
     }
 }
 
-/* A model, and what is off in it. */
+/* A model, and how far it is off. */
 typedef struct mended {
     ov_found model;
-    ov_spot *spot;
     size_t spots;
     double deviation;
 } mended;
-
-static void mended_destroy(mended *m) {
-    ov_found_destroy(&m->model);
-    free(m->spot);
-    *m = (mended){0};
-}
 
 /* Copies the model as it is, with what the last survey says of it. */
 static ovoid_status keep(ovoid_context *context, const job *j, mended *kept) {
@@ -319,12 +312,11 @@ static ovoid_status keep(ovoid_context *context, const job *j, mended *kept) {
         ov_copy(context, model->quadrics, model->count, sizeof *model->quadrics, "ellipsoids");
     made.model.owner =
         ov_copy(context, model->owner, j->parts->atoms, sizeof *model->owner, "owners");
-    made.spot = ov_copy(context, j->total.spot, made.spots, sizeof *made.spot, "spots");
-    if (!made.model.quadrics || !made.model.owner || !made.spot) {
-        mended_destroy(&made);
+    if (!made.model.quadrics || !made.model.owner) {
+        ov_found_destroy(&made.model);
         return OVOID_ERROR_MEMORY;
     }
-    mended_destroy(kept);
+    ov_found_destroy(&kept->model);
     *kept = made;
     return OVOID_OK;
 }
@@ -375,7 +367,7 @@ static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *r
         OV_TRY(survey(context, j));
     }
 cleanup:
-    mended_destroy(&best);
+    ov_found_destroy(&best.model);
     return status;
 }
 

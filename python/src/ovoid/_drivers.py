@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import threading
-from importlib import metadata
 from pathlib import Path
 
 SYSTEM = "/etc/OpenCL/vendors"
@@ -21,6 +20,8 @@ _lock = threading.Lock()
 
 def _packaged() -> str | None:
     """The library of a driver that pip installed beside this package, with all that it needs."""
+    from importlib import metadata  # only here: it takes a tenth as long as importing numpy
+
     for name, library, needed in _PACKAGED:
         try:
             metadata.distribution(needed)

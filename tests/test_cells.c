@@ -274,6 +274,7 @@ static void without_a_surface(void **state) {
     char wanted[500];
     ovoid_measure_options options = defaults();
     ovoid_measures measures;
+    test_skip_simulated(*state);
     for (size_t i = 0; i < 32; ++i) {
         xyzr[i] = i % 4 == 3 ? 1.5 : (double)(i % 7) + (double)(i / 4);
         none[i] = i % 4 == 3 ? 1.0 : 9.0 * (double)(i / 4);
@@ -297,6 +298,7 @@ static void without_a_surface(void **state) {
 static void atoms_in_one_place(void **state) {
     double xyzr[4 * 12];
     const uint32_t sizes[] = {1, 5};
+    test_skip_simulated(*state);
     for (size_t i = 0; i < 48; ++i)
         xyzr[i] = i % 4 == 3 ? 1.4 : i < 24 ? 0.25 : 2.0;
     double *const model = moved(xyzr, 12, 0.5);

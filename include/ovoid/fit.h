@@ -112,6 +112,14 @@ typedef struct ovoid_exchange { /* 24 bytes */
     void *user;
 } ovoid_exchange;
 
+/* Assemblies (molecule.h) that motions carry into themselves, such as capsids: one unit of them is
+ * fitted among its images, and repeated. */
+typedef enum ovoid_symmetry {
+    OVOID_SYMMETRY_USE = 0, /* where there is one, and the number of ellipsoids that is asked for,
+                               if one is, can be shared out equally */
+    OVOID_SYMMETRY_IGNORE   /* the assembly is fitted as any molecule */
+} ovoid_symmetry;
+
 /* How method adaptive cuts a molecule into parts. A part is fitted among its neighbours, those that
  * were fitted before as their ellipsoids and the others as their atoms, so that the goal holds
  * across seams; no ellipsoid stands for atoms of two parts, but where seams were mended. The model
@@ -124,15 +132,6 @@ typedef struct ovoid_exchange { /* 24 bytes */
  * list and not on who was faster. A device that fails, or has no memory for a part, is warned of
  * and left out from then on, by this context, too: others take its parts. When the last one fails,
  * the fit does, and the checkpoint has what was done. */
-
-/* Assemblies (molecule.h) that motions carry into themselves, such as capsids: one unit of them is
- * fitted among its images, and repeated. */
-typedef enum ovoid_symmetry {
-    OVOID_SYMMETRY_USE = 0, /* where there is one, and the number of ellipsoids that is asked for,
-                               if one is, can be shared out equally */
-    OVOID_SYMMETRY_IGNORE   /* the assembly is fitted as any molecule */
-} ovoid_symmetry;
-
 typedef struct ovoid_parts_options { /* 32 bytes */
     uint32_t atoms;  /* of a part at most, from OVOID_LEAST_PART_ATOMS; 0: OVOID_DEFAULT_PART_ATOMS
                         in a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */

@@ -271,7 +271,7 @@ static void expect_units_stand_for_all(ovoid_context *context, size_t atoms, dou
 }
 
 static void units_stand_for_all(void **state) {
-    const size_t atoms = test_size(250, 120);
+    const size_t atoms = 250;
     test_skip_simulated(*state);
     expect_units_stand_for_all(*state, atoms, 0.5 * cbrt(10.0 * (double)atoms) + 1.0, 64);
 }

@@ -355,8 +355,9 @@ static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *r
     choose_all(j);
     OV_TRY(survey(context, j));
     for (; n < ov_tuned.part_mends && j->total.spots > 0; ++n) {
-        if (n == 0 || is_better(&j->total, &best))
-            OV_TRY(keep(context, j, &best));
+        if (n > 0 && !is_better(&j->total, &best))
+            break;
+        OV_TRY(keep(context, j, &best));
         OV_TRY(mend(context, j, result));
     }
     if (n > 0 && !is_better(&j->total, &best)) {

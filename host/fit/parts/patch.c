@@ -263,6 +263,15 @@ static void forget(patch *one) {
     ov_found_destroy(&one->fit.found);
 }
 
+/* Whether the patch is as far off as it was, as can be where images of an ellipsoid meet at an
+ * axis: each of them is refined as if the others stayed. */
+static bool is_no_better(const patch *one) {
+    double before = 0.0;
+    for (size_t n = 0; n < one->spots; ++n)
+        before = fmax(before, one->spot[n].distance);
+    return one->fit.result.verdict == OVOID_VERDICT_MISSED && one->fit.result.distance >= before;
+}
+
 static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *user) {
     ovoid_status status = OVOID_OK;
     const patches *const all = user;
@@ -280,11 +289,14 @@ static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *us
     if (one->atoms == 0)
         goto cleanup;
     OV_TRY(take_start(context, all, one, chosen, place, &start));
-    OV_TRY(fit_patch(context, all, one, chosen, &start, done));
-    OV_TRY(bring_home(context, all, one));
+    status = fit_patch(context, all, one, chosen, &start, done);
+    if (status == OVOID_ERROR_EMPTY || (status == OVOID_OK && is_no_better(one))) {
+        forget(one); /* nothing of the surface is there, or it stays as it is */
+        status = OVOID_OK;
+    } else if (status == OVOID_OK) {
+        status = bring_home(context, all, one);
+    }
 cleanup:
-    if (status == OVOID_ERROR_EMPTY)
-        status = OVOID_OK; /* nothing of the surface is there */
     if (status != OVOID_OK)
         forget(one);
     ov_found_destroy(&start);

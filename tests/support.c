@@ -242,6 +242,16 @@ static size_t rank_at(const ov_quadric *quadrics, size_t count, uint32_t of, con
     return rank;
 }
 
+void expect_same_models(const ovoid_model *a, const ovoid_model *b) {
+    assert_non_null(b);
+    assert_int_equal(ovoid_model_size(a), ovoid_model_size(b));
+    assert_memory_equal(ovoid_model_ellipsoids(a), ovoid_model_ellipsoids(b),
+                        ovoid_model_size(a) * sizeof(ovoid_ellipsoid));
+    assert_int_equal(ovoid_model_owner_count(a), ovoid_model_owner_count(b));
+    assert_memory_equal(ovoid_model_owner(a), ovoid_model_owner(b),
+                        ovoid_model_owner_count(a) * sizeof(uint32_t));
+}
+
 size_t expect_owners(const ovoid_molecule *molecule, const ovoid_model *model, size_t among,
                      double most) {
     const size_t atoms = ovoid_molecule_atoms(molecule), count = ovoid_model_size(model);

@@ -140,6 +140,9 @@ void expect_close(double got, ov_twin_sum wanted, double tolerance, double *wors
 size_t expect_owners(const ovoid_molecule *molecule, const ovoid_model *model, size_t among,
                      double most);
 
+/* Fails unless both have the same ellipsoids and owners, bit by bit. */
+void expect_same_models(const ovoid_model *a, const ovoid_model *b);
+
 /* Fails unless |got - wanted| <= tolerance. */
 void expect_near(double got, double wanted, double tolerance, const char *what);
 

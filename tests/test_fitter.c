@@ -175,15 +175,6 @@ static void expect_holds(ovoid_context *context, const ovoid_molecule *molecule,
     assert_true(deviation <= tolerance + 1e-4);
 }
 
-static void expect_same(const ovoid_model *a, const ovoid_model *b) {
-    assert_int_equal(ovoid_model_size(a), ovoid_model_size(b));
-    assert_memory_equal(ovoid_model_ellipsoids(a), ovoid_model_ellipsoids(b),
-                        ovoid_model_size(a) * sizeof(ovoid_ellipsoid));
-    assert_int_equal(ovoid_model_owner_count(a), ovoid_model_owner_count(b));
-    assert_memory_equal(ovoid_model_owner(a), ovoid_model_owner(b),
-                        ovoid_model_owner_count(a) * sizeof(uint32_t));
-}
-
 /* ---- goal after goal --------------------------------------------------------------------------
  */
 
@@ -199,7 +190,7 @@ static void expect_as_alone(ovoid_context *context, const ovoid_molecule *molecu
     test_check(context, ovoid_fitter_reach(context, fitter, options, &model, &result));
     print_message("%zu ellipsoids, %u samplings\n", ovoid_model_size(model),
                   calls.samplings - before);
-    expect_same(alone, model);
+    expect_same_models(alone, model);
     assert_int_equal(result.iterations, wanted.iterations);
     assert_int_equal(result.adaptive.solver_iterations, wanted.adaptive.solver_iterations);
     assert_int_equal(result.points, wanted.points);
@@ -510,7 +501,7 @@ static void expect_as_many(ovoid_context *context, ovoid_fitter *fitter,
                            const ovoid_model *alone) {
     ovoid_model *model = NULL;
     assert_int_equal(questions_of(context, fitter, options, &model), asked);
-    expect_same(alone, model);
+    expect_same_models(alone, model);
     ovoid_model_destroy(&model);
 }
 
@@ -535,7 +526,7 @@ static void each_question_stops(void **state) {
             fitter = fitter_of(*state, molecule);
         }
         test_check(*state, ovoid_fitter_reach(*state, fitter, &goals[n], &model, NULL));
-        expect_same(alone, model);
+        expect_same_models(alone, model);
         ovoid_model_destroy(&model);
         const unsigned asked = questions_of(*state, fitter, &goals[n], &model);
         ovoid_model_destroy(&model);
@@ -647,12 +638,12 @@ static void errors_leave_it_usable(void **state) {
                      OVOID_ERROR_ARGUMENT, "another context");
         ovoid_context_destroy(&other);
         test_check(*state, ovoid_fitter_reach(*state, fitter, &options, &model, NULL));
-        expect_same(alone, model);
+        expect_same_models(alone, model);
         ovoid_model_destroy(&model);
     }
     test_check(*state, ovoid_context_open_device(*state, NULL)); /* it follows */
     test_check(*state, ovoid_fitter_reach(*state, fitter, &options, &model, NULL));
-    expect_same(alone, model);
+    expect_same_models(alone, model);
     ovoid_model_destroy(&model);
     test_check(*state, ovoid_context_create(&other));
     test_check(other, ovoid_fitter_create(other, molecule, &options, &none));

@@ -207,15 +207,6 @@ static ovoid_model *fit(ovoid_context *context, const ovoid_molecule *molecule,
     return model;
 }
 
-static void expect_same(const ovoid_model *a, const ovoid_model *b) {
-    assert_int_equal(ovoid_model_size(a), ovoid_model_size(b));
-    assert_memory_equal(ovoid_model_ellipsoids(a), ovoid_model_ellipsoids(b),
-                        ovoid_model_size(a) * sizeof(ovoid_ellipsoid));
-    assert_int_equal(ovoid_model_owner_count(a), ovoid_model_owner_count(b));
-    assert_memory_equal(ovoid_model_owner(a), ovoid_model_owner(b),
-                        ovoid_model_owner_count(a) * sizeof(uint32_t));
-}
-
 /* The tolerance holds across seams as a measure of the whole has it, not with many more ellipsoids
  * than a fit of the whole takes, and with the same bits for any number of workers. */
 static void holds_across_seams(void **state) {
@@ -242,7 +233,7 @@ static void holds_across_seams(void **state) {
     for (uint32_t jobs = 2; jobs <= 3; ++jobs) {
         options.parts.jobs = jobs;
         ovoid_model *other = fit(*state, molecule, &options, &again);
-        expect_same(model, other);
+        expect_same_models(model, other);
         assert_int_equal(again.iterations, result.iterations);
         assert_int_equal(again.points, result.points);
         ovoid_model_destroy(&other);
@@ -291,7 +282,7 @@ static void threads_do_not_disturb_each_other(void **state) {
     for (int n = 0; n < 2; ++n)
         for (int k = 0; k < 3; ++k) {
             assert_non_null(of[n].model[k]);
-            expect_same(alone, of[n].model[k]);
+            expect_same_models(alone, of[n].model[k]);
             ovoid_model_destroy(&of[n].model[k]);
         }
     ovoid_model_destroy(&alone);
@@ -414,7 +405,7 @@ static void goes_on_from_a_checkpoint(void **state) {
     assert_int_equal(length_of(path), length);       /* and none of them changed it */
     assert_int_equal(truncate(path, length - 7), 0); /* a record that was cut short */
     test_check(*state, ovoid_fit(*state, molecule, &options, &resumed, &result));
-    expect_same(model, resumed);
+    expect_same_models(model, resumed);
     ovoid_model_destroy(&resumed);
 
     FILE *const file = fopen(path, "rb+"); /* one that a disk has spoilt, and those after it */
@@ -422,7 +413,7 @@ static void goes_on_from_a_checkpoint(void **state) {
     fputs("spoilt", file);
     fclose(file);
     test_check(*state, ovoid_fit(*state, molecule, &options, &resumed, &result));
-    expect_same(model, resumed);
+    expect_same_models(model, resumed);
     ovoid_model_destroy(&resumed);
 
     assert_int_equal(truncate(path, 30), 0);
@@ -468,7 +459,7 @@ static void a_full_disk_leaves_the_checkpoint(void **state) {
     test_refused(*state, status, OVOID_ERROR_IO, "the checkpoint cannot be written");
     assert_int_equal(length_of(path), length);
     test_check(*state, ovoid_fit(*state, molecule, &options, &resumed, &result));
-    expect_same(model, resumed);
+    expect_same_models(model, resumed);
     unlink(path);
     ovoid_model_destroy(&model);
     ovoid_model_destroy(&resumed);

@@ -191,16 +191,6 @@ static void dismiss_ranks(void) {
     memset(all_ranks, 0, sizeof all_ranks);
 }
 
-static void expect_same(const ovoid_model *a, const ovoid_model *b) {
-    assert_non_null(b);
-    assert_int_equal(ovoid_model_size(a), ovoid_model_size(b));
-    assert_memory_equal(ovoid_model_ellipsoids(a), ovoid_model_ellipsoids(b),
-                        ovoid_model_size(a) * sizeof(ovoid_ellipsoid));
-    assert_int_equal(ovoid_model_owner_count(a), ovoid_model_owner_count(b));
-    assert_memory_equal(ovoid_model_owner(a), ovoid_model_owner(b),
-                        ovoid_model_owner_count(a) * sizeof(uint32_t));
-}
-
 static void expect_all(ovoid_status status, const char *text) {
     for (uint32_t n = 0; n < one_hall.ranks; ++n) {
         test_refused(all_ranks[n].context, all_ranks[n].status, status, text);
@@ -220,7 +210,7 @@ static void expect_models(const ovoid_model *model, const ovoid_fit_result *resu
     for (uint32_t n = 0; n < one_hall.ranks; ++n) {
         const rank *const r = &all_ranks[n];
         test_check(r->context, r->status);
-        expect_same(model, r->model);
+        expect_same_models(model, r->model);
         assert_int_equal(r->result.parts, result->parts);
         assert_int_equal(r->result.iterations, result->iterations);
         assert_int_equal(r->result.points, result->points);
@@ -467,7 +457,7 @@ static void a_stop_stops_all_and_they_resume(void **state) {
     run_ranks();
     expect_all(OVOID_ERROR_CANCELLED, "rank 1: ");
     assert_non_null(all_ranks[0].model);
-    expect_same(all_ranks[0].model, all_ranks[1].model);
+    expect_same_models(all_ranks[0].model, all_ranks[1].model);
     assert_true(length_of(path) > 1000);
     dismiss_ranks();
     options.parts.resume = 1;

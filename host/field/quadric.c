@@ -123,3 +123,14 @@ bool ov_quadric_reach(const ov_quadric *quadric, double floor, double half[3]) {
         half[axis] = (1.0 + 1e-6) * (rounded ? longest : sqrt(q * cofactor[axis] / determinant));
     return true;
 }
+
+bool ov_quadric_meets(const ov_quadric *quadric, double floor, const double low[3],
+                      const double high[3]) {
+    double half[3];
+    if (!ov_quadric_reach(quadric, floor, half))
+        return false;
+    for (int k = 0; k < 3; ++k)
+        if (quadric->centre[k] + half[k] < low[k] || quadric->centre[k] - half[k] > high[k])
+            return false;
+    return true;
+}

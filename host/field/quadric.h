@@ -33,6 +33,10 @@ double ov_quadric_log_value(const ov_quadric *quadric, const double at[3]);
  * smaller than they are. False if it nowhere is. */
 bool ov_quadric_reach(const ov_quadric *quadric, double floor, double half[3]);
 
+/* Whether that box about it meets this one. */
+bool ov_quadric_meets(const ov_quadric *quadric, double floor, const double low[3],
+                      const double high[3]);
+
 /* Largest d r^2 of an atom: up to here its exp(d r^2), and sums of many, fit a float. */
 #define OV_EXPONENT_MAX 80.0
 

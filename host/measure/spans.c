@@ -63,18 +63,7 @@ typedef struct group {
 static void unite_groups(ov_sheet *at) {
     const ovoid_mesh *const mesh = at->mesh;
     uint32_t *const of = at->group_of;
-    for (size_t v = 0; v < mesh->vertices; ++v)
-        of[v] = OV_NO_PIECE;
-    for (size_t t = 0; t < mesh->triangles; ++t) {
-        const uint32_t *const corner = mesh->corners + 3 * t;
-        if (at->zone[t] == OV_ZONE_BEYOND)
-            continue;
-        for (size_t i = 0; i < 3; ++i)
-            if (of[corner[i]] == OV_NO_PIECE)
-                of[corner[i]] = corner[i];
-        ov_unite(of, corner[0], corner[1]);
-        ov_unite(of, corner[0], corner[2]);
-    }
+    ov_sheet_unite(at, OV_ZONE_HALO, of);
     at->groups = 0;
     for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
         if (of[v] != OV_NO_PIECE)

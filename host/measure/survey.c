@@ -199,17 +199,13 @@ static void find_zones(const ov_surveyor *s, ov_sheet *at) {
                                                 : OV_ZONE_BEYOND;
 }
 
-/* What hangs together by the triangles in the cell: what does so beyond it only may be an artefact
- * of where its surroundings end. Numbers the pieces. */
-static void find_pieces(ov_sheet *at) {
+void ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of) {
     const ovoid_mesh *const mesh = at->mesh;
-    uint32_t *const of = at->piece_of;
-    size_t count = 0;
     for (size_t v = 0; v < mesh->vertices; ++v)
         of[v] = OV_NO_PIECE;
     for (size_t t = 0; t < mesh->triangles; ++t) {
         const uint32_t *const corner = mesh->corners + 3 * t;
-        if (at->zone[t] != OV_ZONE_CELL)
+        if (at->zone[t] < least)
             continue;
         for (size_t i = 0; i < 3; ++i)
             if (of[corner[i]] == OV_NO_PIECE)
@@ -217,6 +213,15 @@ static void find_pieces(ov_sheet *at) {
         ov_unite(of, corner[0], corner[1]);
         ov_unite(of, corner[0], corner[2]);
     }
+}
+
+/* What hangs together by the triangles in the cell: what does so beyond it only may be an artefact
+ * of where its surroundings end. Numbers the pieces. */
+static void find_pieces(ov_sheet *at) {
+    const ovoid_mesh *const mesh = at->mesh;
+    uint32_t *const of = at->piece_of;
+    size_t count = 0;
+    ov_sheet_unite(at, OV_ZONE_CELL, of);
     for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
         if (of[v] != OV_NO_PIECE)
             of[v] = of[v] == v ? (uint32_t)count++ : of[of[v]];

@@ -10,7 +10,7 @@
 #define OV_NO_PIECE UINT32_MAX
 
 /* Where a triangle is. What lies beyond cell and halo may be an artefact of where the terms end. */
-enum { OV_ZONE_BEYOND, OV_ZONE_HALO, OV_ZONE_CELL };
+enum { OV_ZONE_BEYOND, OV_ZONE_HALO, OV_ZONE_CELL }; /* from the outside to the inside */
 
 /* What is known of a part of a surface. */
 enum { OV_STANDS_INNER, OV_STANDS_OUTER, OV_STANDS_UNKNOWN };
@@ -64,5 +64,9 @@ ovoid_status ov_spans_add(ov_surveyor *surveyor, bool whole, const ov_survey_sta
 /* Makes the distances of these points smaller where something in the cell is nearer to them. */
 ovoid_status ov_spans_seek(ov_surveyor *surveyor, const ov_survey_standing *standing,
                            ov_survey_far *const *far, size_t count);
+
+/* Finds which vertices hang together by triangles in this zone or further in: of[v] leads to the
+ * first of them (mesh/union.h); OV_NO_PIECE: v is of no such triangle. */
+void ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of);
 
 #endif

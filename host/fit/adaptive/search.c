@@ -87,27 +87,16 @@ void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t) {
         ov_factor_quadric(t->x + i * OV_FACTOR_PARAMETERS, &f->quadrics[i]);
 }
 
-/* Whether an ellipsoid is felt where surfaces are judged. */
-static bool is_felt(const ov_adaptive *f, const ov_quadric *quadric) {
-    double half[3];
-    if (!ov_quadric_reach(quadric, ov_tuned.refine_cutoff * f->options->isovalue, half))
-        return false;
-    for (size_t k = 0; k < 3; ++k)
-        if (quadric->centre[k] + half[k] < f->around.low[k] ||
-            quadric->centre[k] - half[k] > f->around.high[k])
-            return false;
-    return true;
-}
-
 size_t ov_adaptive_surround(ov_adaptive *f, size_t count) {
     const size_t fixed = f->around.fixed_count - f->around.lagging;
+    const double floor = ov_tuned.refine_cutoff * f->options->isovalue;
     size_t all = count + fixed;
     if (fixed > 0)
         memcpy(f->quadrics + count, f->around.fixed, fixed * sizeof *f->quadrics);
     for (size_t g = 0; g < f->around.images; ++g)
         for (size_t i = 0; i < count; ++i) {
             ov_quadric_move(&f->quadrics[i], &f->around.image[g], &f->quadrics[all]);
-            all += is_felt(f, &f->quadrics[all]);
+            all += ov_quadric_meets(&f->quadrics[all], floor, f->around.low, f->around.high);
         }
     return all;
 }

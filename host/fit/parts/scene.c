@@ -79,14 +79,12 @@ cleanup:
 
 /* Whether an ellipsoid is felt where the surface about a box is judged. */
 static bool reaches(const ov_parts *parts, const ov_quadric *quadric, const ov_box *box) {
-    double half[3];
-    if (!ov_quadric_reach(quadric, ov_tuned.refine_cutoff * parts->options->isovalue, half))
-        return false;
-    for (size_t k = 0; k < 3; ++k)
-        if (quadric->centre[k] + half[k] < box->low[k] - parts->margin ||
-            quadric->centre[k] - half[k] > box->high[k] + parts->margin)
-            return false;
-    return true;
+    double low[3], high[3];
+    for (size_t k = 0; k < 3; ++k) {
+        low[k] = box->low[k] - parts->margin;
+        high[k] = box->high[k] + parts->margin;
+    }
+    return ov_quadric_meets(quadric, ov_tuned.refine_cutoff * parts->options->isovalue, low, high);
 }
 
 /* An image's ellipsoids that stand for atoms about a box (taken), and those that are felt there;

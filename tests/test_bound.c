@@ -183,6 +183,7 @@ static ovoid_mesh *mesh_ellipsoids(ovoid_context *context, const ovoid_ellipsoid
 
 /* Atoms, and ellipsoids that are them but for changes of every size. */
 static void test_models(void **state) {
+    test_skip_simulated(*state);
     enum { MOST = 3 };
     const size_t pairs = test_size(120, 2);
     test_random random = {41};

@@ -10,7 +10,7 @@
  * there may be so many; and are split no more often than this. */
 #define PIECE ((size_t)1 << 14)
 #define PARTS ((size_t)1 << 18)
-#define ROUNDS 10
+#define ROUNDS 16
 
 /* What single precision may take from a distance, as a share of it and of the edges it is measured
  * from; and what it moves a corner by, as a share of its coordinates. */

@@ -122,9 +122,9 @@ static ov_bound bound_of(ovoid_context *context, const ovoid_mesh *a, const ovoi
     return bound;
 }
 
-static double room(double least, bool loose) {
-    return loose ? fmax(OV_BOUND_ROOM_LOOSE, OV_BOUND_SHARE_LOOSE * least)
-                 : fmax(OV_BOUND_ROOM, OV_BOUND_SHARE * least);
+static double slack(double least, bool loose) {
+    return loose ? fmax(OV_BOUND_SLACK_LOOSE, OV_BOUND_SLACK_SHARE_LOOSE * least)
+                 : fmax(OV_BOUND_SLACK, OV_BOUND_SLACK_SHARE * least);
 }
 
 /* What all bounds keep to; destroys the meshes. Returns how much the bound is above the vertices.
@@ -142,7 +142,7 @@ static double expect_bound(ovoid_context *context, ovoid_mesh *a, ovoid_mesh *b,
           got.least <= found + fmax(pitch[0], pitch[1]) + rounding))
         fail_msg("%s %zu: %.9g are known, %.9g of vertices, %.9g of points", what, number,
                  got.least, of_vertices, found);
-    if (!(got.most <= got.least + room(got.least, false) + rounding))
+    if (!(got.most <= got.least + slack(got.least, false) + rounding))
         fail_msg("%s %zu: from %.9g to %.9g", what, number, got.least, got.most);
     ovoid_mesh_destroy(&a);
     ovoid_mesh_destroy(&b);
@@ -428,8 +428,8 @@ static void test_parallel(void **state) {
         expect_near(got.least, gaps[n], 1e-4, "what is known");
         assert_true(got.most >= gaps[n]);
         if (n < 2)
-            assert_true(got.most <= got.least + room(got.least, n > 0) + 1e-4);
-        assert_true((got.most > got.least + room(got.least, n > 1)) == (n > 0));
+            assert_true(got.most <= got.least + slack(got.least, n > 0) + 1e-4);
+        assert_true((got.most > got.least + slack(got.least, n > 1)) == (n > 0));
         assert_true(got.triangles < (size_t)1 << 20);
         ovoid_mesh_destroy(&a);
         ovoid_mesh_destroy(&b);

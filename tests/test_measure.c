@@ -105,7 +105,7 @@ static void test_same_surface(void **state) {
     expect_near(got.area.error, 0.0, 1e-6, "area");
     expect_near(got.volume.error, 0.0, 1e-6, "volume");
     expect_near(got.distances.hausdorff, 0.0, 1e-4, "hausdorff");
-    expect_near(got.deviation_bound, 0.0, OV_BOUND_ROOM + 1e-4, "bound");
+    expect_near(got.deviation_bound, 0.0, OV_BOUND_SLACK + 1e-4, "bound");
     assert_int_equal(got.components_original, 2);
     assert_int_equal(got.outer_sparse, 2);
     assert_true(got.seconds_mesh > 0.0 && got.seconds_distances > 0.0);

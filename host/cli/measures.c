@@ -73,7 +73,7 @@ void measures_print(FILE *stream, const ovoid_measures *measures,
         fprintf(stream, "deviation %.4g Å: largest of an outer surface from the other surface",
                 measures->deviation);
     if (options->distances && isfinite(measures->deviation_bound))
-        fprintf(stream, "; between vertices at most %.4g Å", measures->deviation_bound);
+        fprintf(stream, "; anywhere on the meshes at most %.4g Å", measures->deviation_bound);
     if (options->distances)
         putc('\n', stream);
     fprintf(stream, "mesh      spacing %.9g Å, %s vertices\n", options->spacing,

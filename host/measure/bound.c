@@ -9,7 +9,7 @@
 /* Triangles are looked at so many at a time, with the parts that they are split into, of which
  * there may be so many; and are split no more often than this. */
 #define PIECE ((size_t)1 << 14)
-#define PARTS ((size_t)1 << 18)
+#define FRAGMENTS ((size_t)1 << 18)
 #define ROUNDS 16
 
 /* What single precision may take from a distance, as a share of it and of the edges it is measured
@@ -18,32 +18,32 @@
 #define CORNER_ROUNDING (2.0 * 1.7320508 / 16777216.0)
 
 /* A triangle of the surface, or a part of one. */
-typedef struct patch {
+typedef struct fragment {
     double at[3][3];    /* relative to the facets' origin, angstrom */
     double distance[3]; /* of the corners */
     double most;        /* no point of it is farther away */
-} patch;
+} fragment;
 
-typedef struct patches {
-    patch *patch;
+typedef struct fragments {
+    fragment *fragment;
     size_t count, capacity;
-} patches;
+} fragments;
 
 /* The bounding of one surface. */
 typedef struct bounding {
     ov_meter *meter;
     ov_facets *facets;
     ov_bound *bound;
-    patches now, next;
+    fragments now, next;
     double margin; /* what rounding may take from a distance, its own share of it aside */
-    bool loose;    /* more room is left */
+    bool loose;    /* more slack is left */
     float *xyz, *squared;
     size_t xyz_capacity, squared_capacity;
 } bounding;
 
 static void bounding_destroy(bounding *b) {
-    free(b->now.patch);
-    free(b->next.patch);
+    free(b->now.fragment);
+    free(b->next.fragment);
     free(b->xyz);
     free(b->squared);
 }
@@ -65,9 +65,9 @@ static double no_less(const bounding *b, float squared) {
 /* What does not reach farther is done with. */
 static double enough(const bounding *b) {
     const double least = b->bound->least,
-                 room = b->loose ? fmax(OV_BOUND_ROOM_LOOSE, OV_BOUND_SHARE_LOOSE * least)
-                                 : fmax(OV_BOUND_ROOM, OV_BOUND_SHARE * least);
-    return fmax(least + room, b->bound->most);
+                 slack = b->loose ? fmax(OV_BOUND_SLACK_LOOSE, OV_BOUND_SLACK_SHARE_LOOSE * least)
+                                  : fmax(OV_BOUND_SLACK, OV_BOUND_SLACK_SHARE * least);
+    return fmax(least + slack, b->bound->most);
 }
 
 /* The corners of a triangle of a trail, as offsets from the facets' origin. */
@@ -99,21 +99,22 @@ static ovoid_status find_margin(ovoid_context *context, const ov_trail *trail, b
 /* A distance changes by no more than one moves. For weights w of the corners that make a point of
  * the triangle, sum w |x - corner| <= sqrt(sum w |x - corner|^2), which is the square root of the
  * sum of w_i w_j |edge_ij|^2 over the edges, and that is at most a third of the longest edge's. */
-static double most_by_corners(const patch *p) {
+static double most_by_corners(const fragment *p) {
     const double farthest = fmax(p->distance[0], fmax(p->distance[1], p->distance[2]));
     return farthest + longest_edge(p->at) / sqrt(3.0);
 }
 
-/* Keeps a patch unless it is done with. */
-static ovoid_status keep(ovoid_context *context, bounding *b, patches *to, const patch *p) {
+/* Keeps a fragment unless it is done with. */
+static ovoid_status keep(ovoid_context *context, bounding *b, fragments *to, const fragment *p) {
     if (p->most <= enough(b)) {
         b->bound->most = fmax(b->bound->most, p->most);
         return OVOID_OK;
     }
-    const ovoid_status status = ov_grow(context, (void *)&to->patch, &to->capacity, to->count + 1,
-                                        sizeof *to->patch, "triangles of a surface");
+    const ovoid_status status =
+        ov_grow(context, (void *)&to->fragment, &to->capacity, to->count + 1, sizeof *to->fragment,
+                "triangles of a surface");
     if (status == OVOID_OK)
-        to->patch[to->count++] = *p;
+        to->fragment[to->count++] = *p;
     return status;
 }
 
@@ -154,7 +155,7 @@ static ovoid_status collect(ovoid_context *context, bounding *b, const ov_trail 
                             const float *squared, size_t *k) {
     ovoid_status status = OVOID_OK;
     for (; *k < from->triangles && b->now.count < PIECE; ++*k) {
-        patch p;
+        fragment p;
         float of[3];
         OV_TRY(ov_progress_turn(context, *k, from->triangles));
         if (!is_outer(from, *k))
@@ -178,31 +179,31 @@ static ovoid_status make_room(ovoid_context *context, bounding *b, size_t floats
                                         sizeof *b->squared, "distances");
 }
 
-/* Asks again of the patches at hand which of them are done with. */
+/* Asks again of the fragments at hand which of them are done with. */
 static ovoid_status sift(ovoid_context *context, bounding *b) {
     ovoid_status status = OVOID_OK;
     const size_t count = b->now.count;
     b->now.count = 0;
     for (size_t n = 0; n < count; ++n)
-        OV_TRY(keep(context, b, &b->now, &b->now.patch[n]));
+        OV_TRY(keep(context, b, &b->now, &b->now.fragment[n]));
 cleanup:
     return status;
 }
 
-/* What single triangles of the other surface say of the patches. */
-static ovoid_status bound_patches(ovoid_context *context, bounding *b) {
+/* What single triangles of the other surface say of the fragments. */
+static ovoid_status bound_fragments(ovoid_context *context, bounding *b) {
     ovoid_status status = OVOID_OK;
     const size_t count = b->now.count;
     OV_TRY(make_room(context, b, 9 * count, count));
     for (size_t n = 0; n < count; ++n) {
-        const patch *const p = &b->now.patch[n];
+        const fragment *const p = &b->now.fragment[n];
         for (size_t i = 0; i < 9; ++i)
             b->xyz[9 * n + i] = (float)p->at[i / 3][i % 3];
         b->squared[n] = (float)(p->most * p->most);
     }
     OV_TRY(ov_facets_reach(context, b->meter, b->facets, b->xyz, count, b->squared));
     for (size_t n = 0; n < count; ++n)
-        b->now.patch[n].most = fmin(b->now.patch[n].most, no_less(b, b->squared[n]));
+        b->now.fragment[n].most = fmin(b->now.fragment[n].most, no_less(b, b->squared[n]));
     b->bound->triangles += count;
     OV_TRY(sift(context, b));
 cleanup:
@@ -215,7 +216,7 @@ static ovoid_status measure_middles(ovoid_context *context, bounding *b) {
     const size_t count = b->now.count;
     const ov_sites sites = {.count = 3 * count, .xyz = b->xyz};
     for (size_t n = 0; n < count; ++n) {
-        const patch *const p = &b->now.patch[n];
+        const fragment *const p = &b->now.fragment[n];
         for (size_t i = 0; i < 3; ++i)
             for (size_t k = 0; k < 3; ++k)
                 b->xyz[9 * n + 3 * i + k] =
@@ -227,18 +228,18 @@ cleanup:
     return status;
 }
 
-/* The four parts of a patch: at each corner, and between the middles of the edges. */
-static ovoid_status split(ovoid_context *context, bounding *b, const patch *p,
+/* The four parts of a fragment: at each corner, and between the middles of the edges. */
+static ovoid_status split(ovoid_context *context, bounding *b, const fragment *p,
                           const float squared[3]) {
     ovoid_status status = OVOID_OK;
-    patch middle = {.most = p->most};
+    fragment middle = {.most = p->most};
     for (size_t i = 0; i < 3; ++i) {
         for (size_t k = 0; k < 3; ++k)
             middle.at[i][k] = 0.5 * (p->at[(i + 1) % 3][k] + p->at[(i + 2) % 3][k]);
         middle.distance[i] = no_less(b, squared[i]);
     }
     for (size_t i = 0; i < 4; ++i) {
-        patch part = middle;
+        fragment part = middle;
         if (i < 3) {
             memcpy(part.at[i], p->at[i], sizeof part.at[i]);
             part.distance[i] = p->distance[i];
@@ -256,30 +257,30 @@ static ovoid_status split_all(ovoid_context *context, bounding *b) {
     OV_TRY(make_room(context, b, 9 * b->now.count, 3 * b->now.count));
     OV_TRY(measure_middles(context, b));
     for (size_t n = 0; n < b->now.count; ++n)
-        OV_TRY(split(context, b, &b->now.patch[n], b->squared + 3 * n));
+        OV_TRY(split(context, b, &b->now.fragment[n], b->squared + 3 * n));
     b->bound->split += b->now.count;
-    const patches done = b->now;
+    const fragments done = b->now;
     b->now = b->next;
     b->next = done;
 cleanup:
     return status;
 }
 
-/* Bounds the patches at hand, or concedes what they may reach. */
+/* Bounds the fragments at hand, or concedes what they may reach. */
 static ovoid_status bound_piece(ovoid_context *context, bounding *b) {
     ovoid_status status = OVOID_OK;
     for (size_t round = 0; b->now.count > 0; ++round) {
-        OV_TRY(bound_patches(context, b));
-        if (4 * b->now.count > PARTS) {
+        OV_TRY(bound_fragments(context, b));
+        if (4 * b->now.count > FRAGMENTS) {
             b->loose = true;
             OV_TRY(sift(context, b));
         }
-        if (4 * b->now.count > PARTS || round == ROUNDS)
+        if (4 * b->now.count > FRAGMENTS || round == ROUNDS)
             break;
         OV_TRY(split_all(context, b));
     }
     for (size_t n = 0; n < b->now.count; ++n)
-        b->bound->most = fmax(b->bound->most, b->now.patch[n].most);
+        b->bound->most = fmax(b->bound->most, b->now.fragment[n].most);
     b->now.count = 0;
 cleanup:
     return status;

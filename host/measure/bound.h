@@ -5,8 +5,8 @@
  * The distance from a triangle t is a convex function, so that over another triangle T it is
  * largest at a corner: no point of T is farther from the whole surface than the farthest of its
  * corners is from t, whichever t that is. The device looks for the t that says least. Where that
- * leaves more room than wanted, T is split in four, and the distances of the new corners raise what
- * is known from below.
+ * leaves more slack than wanted, T is split in four, and the distances of the new corners raise
+ * what is known from below.
  */
 #ifndef OV_BOUND_H
 #define OV_BOUND_H
@@ -21,14 +21,14 @@ typedef struct ov_bound {
 } ov_bound;
 
 /* How far `most` may be above `least`: so much (angstrom), or this share of `least`. */
-#define OV_BOUND_ROOM 0.005
-#define OV_BOUND_SHARE 0.005
+#define OV_BOUND_SLACK 0.005
+#define OV_BOUND_SLACK_SHARE 0.005
 /* The same where two surfaces are so much alike everywhere that this would take too many parts. */
-#define OV_BOUND_ROOM_LOOSE 0.02
-#define OV_BOUND_SHARE_LOOSE 0.05
+#define OV_BOUND_SLACK_LOOSE 0.02
+#define OV_BOUND_SLACK_SHARE_LOOSE 0.05
 
 /* Adds the outer triangles of a trail. squared: of each vertex of its mesh that is in the trail,
- * from the facets, angstrom^2. Where the looser room, too, would take too many parts, `most` is
+ * from the facets, angstrom^2. Where the looser slack, too, would take too many parts, `most` is
  * farther away, and holds. */
 ovoid_status ov_bound_add(ovoid_context *context, ov_meter *meter, ov_facets *facets,
                           const ov_trail *from, const float *squared, ov_bound *bound);

@@ -438,9 +438,10 @@ static void print_summary(const render_job *job) {
     const ovoid_device_info *const device = ovoid_context_device(job->context);
     if (job->molecule)
         reading_print(&job->reading, stream, job->molecule_path, job->molecule);
-    if (job->model)
-        fprintf(stream, "model     %s: %zu ellipsoids\n", source_name(job->model_path),
-                ovoid_model_size(job->model));
+    if (job->model) {
+        source_print_model(job->model, job->model_path, stream);
+        putc('\n', stream);
+    }
     fprintf(stream, "device    %s\n", device->name);
     if (ovoid_image_range(job->image) > 0.0)
         fprintf(stream, "colours   -%g to +%g Å\n", ovoid_image_range(job->image),

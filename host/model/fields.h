@@ -11,7 +11,7 @@
 
 struct ovoid_field {
     ov_tenant tenant;
-    ovoid_model *model; /* a copy, of a model's field; NULL of a molecule's */
+    ovoid_model *model; /* a copy without placements, of a model's field; NULL of a molecule's */
     ov_quadric *quadrics;
     size_t count;
     double decay, isovalue;

@@ -424,6 +424,8 @@ static void exports_and_pictures(void **state) {
     ANSWERS(NULL, ovoid_image_pixels, NULL);
     ANSWERS(0, ovoid_image_covered, NULL);
     UNKNOWN(ovoid_image_range);
+    ANSWERS(0, ovoid_image_radii, NULL, NULL);
+    ANSWERS(0, ovoid_image_radii, all.image, NULL);
     REFUSED(ovoid_image_write, context, NULL, all.image, "/dev/null");
     REFUSED(ovoid_image_write, image, c, NULL, "/dev/null");
     REFUSED(ovoid_image_write, path, c, all.image, NULL);

@@ -23,7 +23,7 @@ static ovoid_field *make(ovoid_context *context, size_t count, double decay, dou
         return NULL;
     ov_tenant_join(context, &field->tenant, leave_device);
     field->quadrics = ov_alloc(context, count, sizeof *field->quadrics, "a field's Gaussians");
-    field->count = count;
+    field->count = field->unit = count;
     field->decay = decay;
     field->isovalue = isovalue;
     if (!field->quadrics)
@@ -69,6 +69,7 @@ ovoid_status ovoid_field_of_model(ovoid_context *context, const ovoid_model *mod
         ovoid_field_destroy(&made);
         return status;
     }
+    made->unit = model->unit_count;
     for (size_t i = 0; i < made->count; ++i)
         ov_quadric_of_ellipsoid(&made->model->unit[i], &made->quadrics[i]);
     *field = made;

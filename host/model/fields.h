@@ -14,6 +14,7 @@ struct ovoid_field {
     ovoid_model *model; /* a copy without placements, of a model's field; NULL of a molecule's */
     ov_quadric *quadrics;
     size_t count;
+    size_t unit; /* terms of a unit, of a model with placements; of others all */
     double decay, isovalue;
     ov_evaluator evaluator; /* of the opened device, where `loaded` */
     bool loaded;

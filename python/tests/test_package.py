@@ -226,6 +226,12 @@ def test_models_of_units(device, tmp_path):
     points = np.array([[0.5, 0, 0], [59, 20, 1], [30, 10, 0]])
     assert np.array_equal(unit.field()(points), everything.field()(points))
     assert unit.mesh().area == everything.mesh().area
+    how = {"view": "ellipsoids", "size": (60, 40), "samples": 1}
+    by_unit = unit.render(**how, colour_by="unit").pixels
+    assert not np.array_equal(by_unit, unit.render(**how).pixels)
+    assert not np.array_equal(by_unit, everything.render(**how, colour_by="unit").pixels)
+    with pytest.raises(ovoid.ArgumentError, match="colours by unit are those of ellipsoids"):
+        unit.render(colour_by="unit")
     unit.write(tmp_path / "unit.ovoid")
     for again in (ovoid.read_model(tmp_path / "unit.ovoid"), pickle.loads(pickle.dumps(unit))):
         assert np.array_equal(again.placements, unit.placements)

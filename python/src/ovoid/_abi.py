@@ -272,6 +272,7 @@ PictureOptions = _structure(
     ("centres", c_bool),
     ("colour_bar", c_bool),
     ("range", c_double),
+    ("colouring", c_int),
 )
 
 Check = _structure(

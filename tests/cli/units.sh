@@ -62,6 +62,9 @@ for model in b e; do
 done
 [ "$(cat placed.txt)" = b ] || fail "measure should say which model has placements"
 cmp b.txt e.txt || fail "measures of the unit and its placements are not those of all"
+apart=$(sed -n 's/^deviation *\([0-9.]*\) Å.*/\1/p' b.txt)
+awk -v apart="$apart" 'BEGIN { exit !(apart > 0 && apart < 0.1) }' ||
+    fail "the model is $apart Å from the assembly"
 [ "$(grep -c '^ATOM\|^HETATM' b.pdb)" = 4 ] || fail "4 pseudo-atoms should be written"
 for file in cxc bild py gmm xyz lmp pdb cif; do
     [ "$(wc -l <b.$file)" = "$(wc -l <e.$file)" ] || fail "not all ellipsoids are in b.$file"

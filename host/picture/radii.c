@@ -1,7 +1,5 @@
 #include "picture/radii.h"
 
-#include "device/device.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

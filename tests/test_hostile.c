@@ -371,6 +371,8 @@ static void memory_follows_atoms_alone(void **state) {
         {RADII, AUTO, "", "R@ A@ 1\n", 20, "", OVOID_ERROR_LIMIT, "more than 1000000 radii"},
         {MODEL, AUTO, "# ovoid model 1\n", "# k@: v\n", 20, "", OVOID_ERROR_LIMIT,
          "bytes of notes"},
+        {MODEL, AUTO, "# ovoid model 2\n", "# placement: 1 0 0 0 1 0 0 0 1 0 0 @\n", 20, "",
+         OVOID_ERROR_LIMIT, ":100002:1: more than 100000 placements"},
         {MODEL, AUTO, "# ovoid model 1\n", "1", 100, "", OVOID_ERROR_FORMAT, "is too long"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)

@@ -273,6 +273,8 @@ static void fields_and_models(void **state) {
     ovoid_fit_options options;
     double value;
     ovoid_fit_options_init(&options, sizeof options);
+    const ovoid_motion motion = {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
+    size_t count;
     ovoid_field *field;
     REFUSED(ovoid_field_of_molecule, context, NULL, all.molecule, 0.5, 1.0, &field);
     REFUSED(ovoid_field_of_molecule, molecule, c, NULL, 0.5, 1.0, &field);
@@ -290,6 +292,17 @@ static void fields_and_models(void **state) {
     REFUSED(ovoid_model_create, context, NULL, &one, 1, 0.5, 1.0, &made);
     REFUSED(ovoid_model_create, ellipsoids, c, NULL, 1, 0.5, 1.0, &made);
     REFUSED(ovoid_model_create, model, c, &one, 1, 0.5, 1.0, NULL);
+    REFUSED(ovoid_model_create_placed, context, NULL, &one, 1, &motion, 1, 0.5, 1.0, &made);
+    REFUSED(ovoid_model_create_placed, ellipsoids, c, NULL, 1, &motion, 1, 0.5, 1.0, &made);
+    REFUSED(ovoid_model_create_placed, placements, c, &one, 1, NULL, 1, 0.5, 1.0, &made);
+    REFUSED(ovoid_model_create_placed, model, c, &one, 1, &motion, 1, 0.5, 1.0, NULL);
+    REFUSED(ovoid_model_expand, context, NULL, all.model, &made);
+    REFUSED(ovoid_model_expand, model, c, NULL, &made);
+    REFUSED(ovoid_model_expand, expanded, c, all.model, NULL);
+    ANSWERS(0, ovoid_model_unit_size, NULL);
+    ANSWERS(NULL, ovoid_model_unit_ellipsoids, NULL);
+    ANSWERS(NULL, ovoid_model_placements, NULL, &count);
+    ANSWERS(NULL, ovoid_model_placements, all.model, NULL);
     ANSWERS(0, ovoid_model_size, NULL);
     ANSWERS(NULL, ovoid_model_ellipsoids, NULL);
     UNKNOWN(ovoid_model_decay);
@@ -411,6 +424,8 @@ static void exports_and_pictures(void **state) {
     ANSWERS(NULL, ovoid_image_pixels, NULL);
     ANSWERS(0, ovoid_image_covered, NULL);
     UNKNOWN(ovoid_image_range);
+    ANSWERS(0, ovoid_image_radii, NULL, NULL);
+    ANSWERS(0, ovoid_image_radii, all.image, NULL);
     REFUSED(ovoid_image_write, context, NULL, all.image, "/dev/null");
     REFUSED(ovoid_image_write, image, c, NULL, "/dev/null");
     REFUSED(ovoid_image_write, path, c, all.image, NULL);

@@ -652,6 +652,69 @@ static void overlay_shows_both(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* A ball in the middle, and others about it: near is blue, far is red, whatever is turned. */
+static void radii_have_colours(void **state) {
+    static const double balls[20] = {0.0, 0.0, 0.0, 2.0, 10.0, 0.0, 0.0, 2.0,  -10.0, 0.0,
+                                     0.0, 2.0, 0.0, 10., 0.0,  2.0, 0.0, -10., 0.0,   2.0};
+    ovoid_molecule *molecule = make_molecule(*state, balls, 5);
+    const uint32_t side = (uint32_t)test_size(65, 33), middle = side / 2;
+    ovoid_picture_options options = small_picture(side, side);
+    double radii[2] = {7.0, 7.0};
+    test_skip_simulated(*state);
+    options.direction[2] = 1.0;
+    options.across = 26.0;
+    ovoid_image *plain = render(*state, molecule, NULL, &options);
+    assert_false(ovoid_image_radii(plain, radii));
+    assert_true(radii[0] == 7.0);
+    options.colouring = OVOID_PICTURE_BY_RADIUS;
+    ovoid_image *image = render(*state, molecule, NULL, &options);
+    assert_true(ovoid_image_radii(image, radii));
+    expect_near(radii[0], 2.0, 0.1, "the inmost of what is seen");
+    expect_near(radii[1], 12.0, 0.3, "the outermost of what is seen");
+    assert_int_equal(ovoid_image_covered(image), ovoid_image_covered(plain));
+    const uint32_t off = (uint32_t)(10.0 / 26.0 * side + 0.5);
+    const uint8_t *const near = pixel_of(image, middle, middle);
+    const uint8_t *const far[2] = {pixel_of(image, middle + off, middle),
+                                   pixel_of(image, middle, middle - off)};
+    assert_true(near[2] > near[0] + 40);
+    for (int k = 0; k < 2; ++k)
+        assert_true(far[k][0] > far[k][2] + 40);
+    assert_memory_equal(pixel_of(image, 0, 0), pixel_of(plain, 0, 0), 4);
+    ovoid_image_destroy(&plain);
+    ovoid_image_destroy(&image);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Two units of two ellipsoids each, in a row. */
+static void units_have_colours(void **state) {
+    const double d = 0.5;
+    const ovoid_ellipsoid two[2] = {{exp(2.0), {d, d, d}, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}},
+                                    {exp(2.0), {d, d, d}, {5.0, 0.0, 0.0}, {0.0, 0.0, 0.0}}};
+    const ovoid_motion placements[2] = {{{1, 0, 0, 0, 1, 0, 0, 0, 1}, {-7.5, 0.0, 0.0}},
+                                        {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {2.5, 0.0, 0.0}}};
+    const uint32_t height = 7, row = 3;
+    ovoid_picture_options options = small_picture(80, height);
+    ovoid_model *model = NULL;
+    test_skip_simulated(*state);
+    test_check(*state, ovoid_model_create_placed(*state, two, 2, placements, 2, d, 1.0, &model));
+    options.view = OVOID_VIEW_ELLIPSOIDS;
+    options.centres = false;
+    options.direction[2] = 1.0;
+    options.across = 20.0;
+    for (int by_unit = 0; by_unit < 2; ++by_unit) {
+        options.colouring = by_unit ? OVOID_PICTURE_BY_UNIT : OVOID_PICTURE_PLAIN;
+        ovoid_image *image = render(*state, NULL, model, &options);
+        const uint8_t *const first = pixel_of(image, 10, row), *const second = first + 4 * 20,
+                             *const other = first + 4 * 40;
+        assert_true(memcmp(first, "\xff\xff\xff", 3) != 0);
+        assert_int_equal(memcmp(first, second, 4) == 0, by_unit);
+        assert_true(memcmp(first, other, 4) != 0);
+        assert_int_equal(memcmp(other, other + 4 * 20, 4) == 0, by_unit);
+        ovoid_image_destroy(&image);
+    }
+    ovoid_model_destroy(&model);
+}
+
 static void centres_are_marked(void **state) {
     test_skip_simulated(*state);
     ovoid_model *model = make_sphere_model(*state, 4.0, exp(2.0), 0.5);
@@ -755,6 +818,10 @@ static void bad_arguments_are_refused(void **state) {
     REFUSED("needs the model's");
     o.view = (ovoid_view)17;
     REFUSED("no view 17");
+    o.colouring = (ovoid_picture_colouring)3;
+    REFUSED("no colouring 3");
+    o.colouring = OVOID_PICTURE_BY_UNIT;
+    REFUSED("colours by unit are those of ellipsoids");
 #undef REFUSED
     o.view = OVOID_VIEW_ORIGINAL;
     test_refused(*state, once_render(*state, NULL, 0.5, NULL, &o, &image), OVOID_ERROR_ARGUMENT,
@@ -905,6 +972,8 @@ int main(void) {
         cmocka_unit_test(tiny_pictures),
         cmocka_unit_test(difference_has_its_sign),
         cmocka_unit_test(overlay_shows_both),
+        cmocka_unit_test(radii_have_colours),
+        cmocka_unit_test(units_have_colours),
         cmocka_unit_test(centres_are_marked),
         cmocka_unit_test(panel_is_three_pictures),
         cmocka_unit_test(pictures_repeat_exactly),

@@ -268,6 +268,64 @@ static void expect_units_stand_for_all(ovoid_context *context, size_t atoms, dou
     ovoid_molecule_destroy(&molecule);
 }
 
+/* Both surfaces, as a file of the model gives them back. */
+static ovoid_measures measure_file(ovoid_context *context, const ovoid_molecule *molecule,
+                                   const ovoid_model *model) {
+    ovoid_model *again = NULL;
+    ovoid_field *original = NULL, *sparse = NULL;
+    ovoid_measure_options options;
+    ovoid_measures measures;
+    ovoid_measure_options_init(&options, sizeof options);
+    ovoid_measures_init(&measures, sizeof measures);
+    test_check(context, ovoid_model_write(context, model, "symmetry.ovoid"));
+    test_check(context, ovoid_model_read(context, "symmetry.ovoid", &again));
+    unlink("symmetry.ovoid");
+    test_check(context, ovoid_field_of_molecule(context, molecule, 0.5, 1.0, &original));
+    test_check(context, ovoid_field_of_model(context, again, &sparse));
+    assert_int_equal(ovoid_field_terms(sparse), ovoid_model_size(model));
+    test_check(context, ovoid_measure(context, original, sparse, &options, &measures));
+    ovoid_field_destroy(&original);
+    ovoid_field_destroy(&sparse);
+    ovoid_model_destroy(&again);
+    return measures;
+}
+
+/* A fit gives the unit and its motions, which expanded are all there is. */
+static void models_are_units_and_motions(void **state) {
+    const ov_rigid of[3] = {screw(0.0, 0.0), screw(1.0 / 3.0, 0.0), screw(2.0 / 3.0, 0.0)};
+    ovoid_molecule *molecule = assembly(*state, 100, 8.0, 0.0, 0.0, of, 3);
+    ovoid_fit_options options;
+    ovoid_fit_result result;
+    ovoid_model *all = NULL;
+    size_t placements;
+    test_skip_simulated(*state);
+    ovoid_fit_options_init(&options, sizeof options);
+    options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+    options.adaptive.ellipsoids = 30;
+    ovoid_model *model = fit(*state, molecule, &options, &result);
+    const ovoid_motion *const motions = ovoid_model_placements(model, &placements);
+    assert_int_equal(placements, 3);
+    for (size_t n = 0; n < 3; ++n) {
+        for (size_t k = 0; k < 9; ++k)
+            expect_near(motions[n].rotation[k], of[n].rotation[k], 1e-9, "a rotation");
+        for (size_t k = 0; k < 3; ++k)
+            expect_near(motions[n].translation[k], of[n].shift[k], 1e-8, "a translation");
+    }
+    assert_int_equal(ovoid_model_unit_size(model), 10);
+    test_check(*state, ovoid_model_expand(*state, model, &all));
+    expect_repeated(all, of, 3);
+    expect_same_models(model, all);
+    const ovoid_measures placed = measure_file(*state, molecule, model);
+    const ovoid_measures expanded = measure_file(*state, molecule, all);
+    expect_near(placed.area.sparse, expanded.area.sparse, 1e-5 * expanded.area.sparse, "area");
+    expect_near(placed.volume.sparse, expanded.volume.sparse, 1e-5 * expanded.volume.sparse,
+                "volume");
+    expect_near(placed.deviation, expanded.deviation, 1e-4, "deviation");
+    ovoid_model_destroy(&model);
+    ovoid_model_destroy(&all);
+    ovoid_molecule_destroy(&molecule);
+}
+
 static void units_stand_for_all(void **state) {
     const size_t atoms = 250;
     test_skip_simulated(*state);
@@ -336,15 +394,53 @@ static void sessions_go_on_with_all_atoms(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* The model of a unit goes along with all atoms. */
+static void frames_go_on_with_all_atoms(void **state) {
+    const ov_rigid of[2] = {screw(0.0, 0.0), screw(0.5, 0.0)};
+    ovoid_molecule *molecule = assembly(*state, 60, 7.0, 0.0, 0.0, of, 2);
+    ovoid_fit_options options;
+    ovoid_fit_result first, result;
+    ovoid_fitter *fitter = NULL;
+    ovoid_model *model = NULL, *next = NULL;
+    double *const xyz = test_alloc(3 * ovoid_molecule_atoms(molecule), sizeof *xyz);
+    test_skip_simulated(*state);
+    ovoid_fit_options_init(&options, sizeof options);
+    ovoid_fit_result_init(&first, sizeof first);
+    ovoid_fit_result_init(&result, sizeof result);
+    for (size_t i = 0; i < 3 * ovoid_molecule_atoms(molecule); ++i)
+        xyz[i] = ovoid_molecule_xyzr(molecule)[4 * (i / 3) + i % 3] + 5.0;
+    test_check(*state, ovoid_fitter_create(*state, molecule, &options, &fitter));
+    test_check(*state, ovoid_fitter_reach(*state, fitter, &options, &model, &first));
+    assert_int_equal(first.units, 2);
+    test_check(*state, ovoid_fitter_move(*state, fitter, xyz));
+    test_check(*state, ovoid_fitter_reach(*state, fitter, &options, &next, &result));
+    assert_int_equal(result.units, 1);
+    assert_true(result.reached);
+    assert_int_equal(ovoid_model_size(next), ovoid_model_size(model));
+    assert_memory_equal(ovoid_model_owner(next), ovoid_model_owner(model),
+                        ovoid_model_owner_count(model) * sizeof(uint32_t));
+    for (size_t i = 0; i < ovoid_model_size(next); ++i)
+        for (size_t k = 0; k < 3; ++k)
+            expect_near(ovoid_model_ellipsoids(next)[i].centre[k],
+                        ovoid_model_ellipsoids(model)[i].centre[k] + 5.0, 2.0, "a centre");
+    ovoid_fitter_destroy(&fitter);
+    ovoid_model_destroy(&model);
+    ovoid_model_destroy(&next);
+    ovoid_molecule_destroy(&molecule);
+    free(xyz);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(groups_are_found),
         cmocka_unit_test(units_of_several_placements_are_found),
         cmocka_unit_test(units_add_up),
+        cmocka_unit_test(models_are_units_and_motions),
         cmocka_unit_test(units_stand_for_all),
         cmocka_unit_test(seams_at_an_axis_are_mended),
         cmocka_unit_test(numbers_are_those_asked_for),
         cmocka_unit_test(sessions_go_on_with_all_atoms),
+        cmocka_unit_test(frames_go_on_with_all_atoms),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

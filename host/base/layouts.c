@@ -32,6 +32,9 @@ AT(ovoid_placement, translation, 72);
 AT(ovoid_placement, part, 96);
 AT(ovoid_placement, first, 104);
 
+PROMISED(ovoid_motion, 12 * sizeof(double));
+AT(ovoid_motion, translation, 9 * sizeof(double));
+
 PROMISED(ovoid_guess, 40);
 AT(ovoid_guess, radius, 24);
 PROMISED(ovoid_assembly_info, 32);
@@ -87,7 +90,8 @@ static const struct {
              SIZE(ovoid_atom),          SIZE(ovoid_residue),           SIZE(ovoid_guess),
              SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options),
              SIZE(ovoid_check),         SIZE(ovoid_selftest_options),  SIZE(ovoid_selftest_result),
-             SIZE(ovoid_scene),         SIZE(ovoid_parts_options),     SIZE(ovoid_exchange)};
+             SIZE(ovoid_scene),         SIZE(ovoid_parts_options),     SIZE(ovoid_exchange),
+             SIZE(ovoid_motion)};
 #undef SIZE
 
 size_t ovoid_sizeof(const char *type) {

@@ -1,5 +1,7 @@
 #include "base/rigid.h"
 
+#include <math.h>
+
 const ov_rigid ov_rigid_identity = {.rotation = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}};
 
 void ov_rigid_turn(const ov_rigid *rigid, const double direction[3], double turned[3]) {
@@ -13,6 +15,21 @@ void ov_rigid_move(const ov_rigid *rigid, const double at[3], double moved[3]) {
     ov_rigid_turn(rigid, at, moved);
     for (int k = 0; k < 3; ++k)
         moved[k] += rigid->shift[k];
+}
+
+bool ov_is_rotation(const double r[9], double most) {
+    double worst = 0.0;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+            double sum = i == j ? -1.0 : 0.0;
+            for (int k = 0; k < 3; ++k)
+                sum += r[3 * i + k] * r[3 * j + k];
+            worst = fmax(worst, fabs(sum));
+        }
+    return worst <= most && r[0] * (r[4] * r[8] - r[5] * r[7]) -
+                                    r[1] * (r[3] * r[8] - r[5] * r[6]) +
+                                    r[2] * (r[3] * r[7] - r[4] * r[6]) >
+                                0.0;
 }
 
 ov_rigid ov_rigid_inverse(const ov_rigid *rigid) {

@@ -4,6 +4,8 @@
 #ifndef OV_RIGID_H
 #define OV_RIGID_H
 
+#include <stdbool.h>
+
 /* x' = rotation x + shift. */
 typedef struct ov_rigid {
     double rotation[9]; /* row by row */
@@ -16,6 +18,10 @@ void ov_rigid_move(const ov_rigid *rigid, const double at[3], double moved[3]);
 
 /* Directions turn, and do not move. */
 void ov_rigid_turn(const ov_rigid *rigid, const double direction[3], double turned[3]);
+
+/* Whether it keeps shapes: its rows are unit vectors, at right angles to each other to within
+ * `most`, and nothing is mirrored. */
+bool ov_is_rotation(const double rotation[9], double most);
 
 ov_rigid ov_rigid_inverse(const ov_rigid *rigid);
 

@@ -269,10 +269,25 @@ static int measure_all(fit_job *job) {
     return code;
 }
 
+/* The model's units become ellipsoids as all others. */
+static ovoid_status expand(const fit_job *job, fit_level *level) {
+    ovoid_model *all = NULL;
+    if (!job->expand || !ovoid_model_placements(level->model, NULL))
+        return OVOID_OK;
+    const ovoid_status status = ovoid_model_expand(job->context, level->model, &all);
+    if (status == OVOID_OK) {
+        ovoid_model_destroy(&level->model);
+        level->model = all;
+    }
+    return status;
+}
+
 static ovoid_status write_models(fit_job *job) {
     ovoid_status status = OVOID_OK;
     for (size_t i = 0; i < job->levels_done && status == OVOID_OK; i++) {
-        status = fit_annotate(job, i);
+        status = expand(job, &job->levels[i]);
+        if (status == OVOID_OK)
+            status = fit_annotate(job, i);
         if (status == OVOID_OK)
             status = ovoid_model_write(job->context, job->levels[i].model, job->levels[i].path);
         if (status == OVOID_OK)

@@ -61,6 +61,7 @@ typedef struct fit_job {
     ovoid_fit_options options; /* with the method's spacing, never 0 */
     uint32_t level_count;      /* asked for */
     double time_limit;         /* of the fits of all levels together, seconds; 0: none */
+    bool expand;               /* write all units of a symmetric assembly */
     bool measure;              /* compare the surfaces at the end */
     ovoid_measure_options measuring;
     cli_profile profile; /* of the fits of all levels; `wanted` was asked, the rest came of it */

@@ -114,9 +114,13 @@ static void print_adaptive(const ovoid_fit_options *defaults, FILE *stream) {
                     "options, device or version is refused",
                     stream);
     cli_option_help("--no-symmetry",
-                    "fit all of a symmetric assembly, instead of one unit among its images that is "
-                    "repeated then",
+                    "fit all of a symmetric assembly, instead of one unit among its images",
                     stream);
+    cli_option_help(
+        "--expand",
+        "write the ellipsoids of all units of a symmetric assembly, instead of those of "
+        "one unit and its placements",
+        stream);
 }
 
 static void print_l1(const ovoid_fit_options *defaults, FILE *stream) {

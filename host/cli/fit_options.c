@@ -135,6 +135,7 @@ enum {
     CHECKPOINT,
     RESUME,
     NO_SYMMETRY,
+    EXPAND,
     LEVELS,
     TIME_LIMIT,
     PROFILE,
@@ -160,6 +161,7 @@ static const struct option named[] = {
     {"checkpoint", required_argument, NULL, CHECKPOINT},
     {"resume", no_argument, NULL, RESUME},
     {"no-symmetry", no_argument, NULL, NO_SYMMETRY},
+    {"expand", no_argument, NULL, EXPAND},
     {"levels", required_argument, NULL, LEVELS},
     {"time-limit", required_argument, NULL, TIME_LIMIT},
     {"profile", no_argument, NULL, PROFILE},
@@ -428,6 +430,10 @@ static bool parse_named(parser *p, int option) {
     case NO_SYMMETRY:
         p->adaptive = "no-symmetry";
         job->options.parts.symmetry = OVOID_SYMMETRY_IGNORE;
+        return true;
+    case EXPAND:
+        p->adaptive = "expand";
+        job->expand = true;
         return true;
     case PROFILE:
         job->profile.wanted = true;

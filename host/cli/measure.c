@@ -235,13 +235,11 @@ static ovoid_status read_inputs(measure_job *job) {
 }
 
 static void print_before(const measure_job *job) {
-    const size_t size = ovoid_model_size(job->model);
     if (!job->summary)
         return;
     reading_print(&job->reading, job->summary, job->molecule_path, job->molecule);
-    fprintf(job->summary, "model     %s: %zu ellipsoid%s, decay %.9g Å⁻²\n",
-            source_name(job->model_path), size, size == 1 ? "" : "s",
-            ovoid_model_decay(job->model));
+    source_print_model(job->model, job->model_path, job->summary);
+    fprintf(job->summary, ", decay %.9g Å⁻²\n", ovoid_model_decay(job->model));
     cli_print_device(job->context, job->summary);
     fflush(job->summary);
 }

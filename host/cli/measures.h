@@ -34,6 +34,12 @@ char *source_output(const char *input, const char *extension);
 /* "standard input" for "-". */
 const char *source_name(const char *path);
 
+/* ", 60 placements of 1471" after the number of a model's ellipsoids; nothing of a model without.
+ */
+void source_print_placements(const ovoid_model *model, FILE *out);
+/* "model     FILE: 215 ellipsoids", without the line's end. */
+void source_print_model(const ovoid_model *model, const char *path, FILE *out);
+
 /* ---- options (measures.c) ------------------------------------------------------------------- */
 
 bool measures_parse_vertices(const char *text, ovoid_vertex_rule *vertices);

@@ -180,12 +180,12 @@ static void print_before(const mesh_job *job) {
     if (!job->summary)
         return;
     cli_progress_erase();
-    if (job->source.model)
-        fprintf(job->summary, "model     %s: %zu ellipsoid%s\n", source_name(job->input),
-                ovoid_model_size(job->source.model),
-                ovoid_model_size(job->source.model) == 1 ? "" : "s");
-    else
+    if (job->source.model) {
+        source_print_model(job->source.model, job->input, job->summary);
+        putc('\n', job->summary);
+    } else {
         reading_print(&job->reading, job->summary, job->input, job->source.molecule);
+    }
     if (job->source.molecule)
         fprintf(job->summary, "field     decay %.9g Å⁻²\n", job->decay);
     cli_print_device(job->context, job->summary);

@@ -53,6 +53,7 @@ enum {
     ROTATE,
     CENTRE,
     COLOUR,
+    COLOUR_BY,
     BACKGROUND,
     NO_CENTRES,
     NO_BAR,
@@ -72,6 +73,8 @@ static const struct option named[] = {
     {"centre", required_argument, NULL, CENTRE},
     {"colour", required_argument, NULL, COLOUR},
     {"background", required_argument, NULL, BACKGROUND},
+    {"colour-by", required_argument, NULL, COLOUR_BY},
+    {"color-by", required_argument, NULL, COLOUR_BY},
     {"no-centres", no_argument, NULL, NO_CENTRES},
     {"no-bar", no_argument, NULL, NO_BAR},
     READING_OPTIONS,
@@ -112,6 +115,10 @@ void cli_render_help(FILE *stream) {
         "                      panel       original, model and overlay in a row\n"
         "                      (default: overlay, or the one there is)\n"
         "  --panel             the same as --view panel\n"
+        "  --colour-by radius|unit|none\n"
+        "                      colour the surface, or ellipsoids, by how far from the middle\n"
+        "                      what is seen is, blue for near, red for far; or ellipsoids by\n"
+        "                      the placement of the model's unit (default: none)\n"
         "  --no-centres        leave out the ellipsoids' centres\n"
         "  --no-bar            leave out the difference's colour bar\n");
     fprintf(stream,
@@ -250,6 +257,34 @@ static bool parse_colours(const char *text, ovoid_picture_options *options) {
                         &options->model);
 }
 
+/* In the order of ovoid_picture_colouring. */
+static const char *const colouring_names[] = {"none", "radius", "unit"};
+enum { COLOURINGS = sizeof colouring_names / sizeof *colouring_names };
+
+static bool parse_colouring(const char *text, ovoid_picture_options *options) {
+    for (int i = 0; i < COLOURINGS; i++)
+        if (strcmp(text, colouring_names[i]) == 0) {
+            options->colouring = (ovoid_picture_colouring)i;
+            return true;
+        }
+    cli_error("--colour-by takes radius, unit or none, not '%s'", text);
+    return false;
+}
+
+static bool check_colouring(const ovoid_picture_options *options) {
+    const ovoid_view view = options->view;
+    const bool ellipsoids = view == OVOID_VIEW_ELLIPSOIDS;
+    const bool alone = ellipsoids || view == OVOID_VIEW_ORIGINAL || view == OVOID_VIEW_MODEL;
+    if (options->colouring == OVOID_PICTURE_BY_RADIUS && !alone)
+        cli_error("--colour-by radius is for the views original, model and ellipsoids, not '%s'",
+                  view_names[view]);
+    else if (options->colouring == OVOID_PICTURE_BY_UNIT && !ellipsoids)
+        cli_error("--colour-by unit is for the view ellipsoids, not '%s'", view_names[view]);
+    else
+        return true;
+    return false;
+}
+
 /* ---- the command line ----------------------------------------------------------------------- */
 
 static bool check_files(const render_job *job) {
@@ -315,6 +350,8 @@ static bool complete(int argc, char **argv, render_job *job) {
                   view);
         return false;
     }
+    if (!check_colouring(options))
+        return false;
     if (options->view == OVOID_VIEW_PANEL && !job->size_given) {
         options->width = 2100;
         options->height = 660;
@@ -358,6 +395,8 @@ static bool take_option(int option, render_job *job) {
         return parse_vector("--centre", optarg, options->centre);
     case COLOUR:
         return parse_colours(optarg, options);
+    case COLOUR_BY:
+        return parse_colouring(optarg, options);
     case BACKGROUND:
         return parse_colour("--background", optarg, strlen(optarg), true, &options->background);
     case NO_CENTRES:
@@ -438,10 +477,15 @@ static void print_summary(const render_job *job) {
     const ovoid_device_info *const device = ovoid_context_device(job->context);
     if (job->molecule)
         reading_print(&job->reading, stream, job->molecule_path, job->molecule);
-    if (job->model)
-        fprintf(stream, "model     %s: %zu ellipsoids\n", source_name(job->model_path),
-                ovoid_model_size(job->model));
+    if (job->model) {
+        source_print_model(job->model, job->model_path, stream);
+        putc('\n', stream);
+    }
     fprintf(stream, "device    %s\n", device->name);
+    double radii[2];
+    if (ovoid_image_radii(job->image, radii))
+        fprintf(stream, "colours   from %.4g Å from the middle, blue, to %.4g Å, red\n", radii[0],
+                radii[1]);
     if (ovoid_image_range(job->image) > 0.0)
         fprintf(stream, "colours   -%g to +%g Å\n", ovoid_image_range(job->image),
                 ovoid_image_range(job->image));

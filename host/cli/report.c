@@ -94,6 +94,7 @@ static void add_result(builder *b, const fit_job *job, const fit_level *level) {
     if (level->owners)
         add_string(b, "owners", level->owners);
     add_number(b, "ellipsoids", (double)result->ellipsoids);
+    add_number(b, "unit_ellipsoids", (double)ovoid_model_unit_size(level->model));
     add_number(b, "sparse_ratio",
                (double)result->ellipsoids / (double)ovoid_molecule_atoms(job->molecule));
     add_number(b, "points", (double)result->points);

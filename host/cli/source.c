@@ -1,5 +1,6 @@
 #include "measures.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -42,4 +43,16 @@ char *source_output(const char *input, const char *extension) {
 
 const char *source_name(const char *path) {
     return strcmp(path, "-") == 0 ? "standard input" : path;
+}
+
+void source_print_placements(const ovoid_model *model, FILE *out) {
+    size_t placements;
+    if (ovoid_model_placements(model, &placements))
+        fprintf(out, ", %zu placements of %zu", placements, ovoid_model_unit_size(model));
+}
+
+void source_print_model(const ovoid_model *model, const char *path, FILE *out) {
+    const size_t size = ovoid_model_size(model);
+    fprintf(out, "model     %s: %zu ellipsoid%s", source_name(path), size, size == 1 ? "" : "s");
+    source_print_placements(model, out);
 }

@@ -125,9 +125,11 @@ void fit_summary_after(const fit_job *job) {
     print_stop(out, job);
     if (!l1)
         print_goal(out, job);
-    fprintf(out, "model     %llu ellipsoid%s for %llu atom%s: sparse ratio %.3g\n",
+    fprintf(out, "model     %llu ellipsoid%s for %llu atom%s: sparse ratio %.3g",
             (count)result->ellipsoids, plural(result->ellipsoids), atoms, plural(atoms),
             (double)result->ellipsoids / (double)atoms);
+    source_print_placements(first->model, out);
+    putc('\n', out);
     if (l1)
         fprintf(out, "error     rms %.3g, largest %.3g (of the field, over the points)\n",
                 result->l1.rms_error, result->l1.max_error);

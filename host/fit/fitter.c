@@ -35,6 +35,7 @@ struct ovoid_fitter {
     ov_l1_band *band;          /* of method l1, likewise */
     ov_found start;            /* what method adaptive begins with; count 0: the atoms */
     ov_found last;             /* what it came to after that; count 0: nothing */
+    bool last_by_unit;         /* that is the model of the unit */
 };
 
 /* ---- the object ------------------------------------------------------------------------------ */
@@ -176,11 +177,27 @@ cleanup:
     return status;
 }
 
-/* The model in the paper's parameters, with a copy of its owners. */
-static ovoid_status hand_over(ovoid_context *context, const ov_found *found, size_t atoms,
+/* ---- handing over ---------------------------------------------------------------------------- */
+
+/* The owners of all atoms, whose units follow one another among the ellipsoids. */
+static void spread_owners(const ov_symmetry *symmetry, const ov_found *unit, uint32_t *owner) {
+    for (size_t g = 0; g < symmetry->order; ++g) {
+        const uint32_t *from = unit->owner;
+        for (size_t u = 0; u < symmetry->units; ++u) {
+            uint32_t *const to = owner + symmetry->first[g * symmetry->units + u];
+            for (size_t n = 0; n < symmetry->atoms[u]; ++n)
+                to[n] = (uint32_t)(g * unit->count) + *from++;
+        }
+    }
+}
+
+/* The model in the paper's parameters, with a copy of its owners; by_unit: found is that of a unit,
+ * and the owners are those of all atoms. */
+static ovoid_status hand_over(const ovoid_fitter *fitter, const ov_found *found, bool by_unit,
                               ovoid_ellipsoid **ellipsoids, uint32_t **owner) {
+    ovoid_context *const context = fitter->context;
     ovoid_ellipsoid *const made = ov_alloc(context, found->count, sizeof *made, "ellipsoids");
-    uint32_t *const owned = ov_alloc(context, atoms, sizeof *owned, "owners");
+    uint32_t *const owned = ov_alloc(context, fitter->atoms, sizeof *owned, "owners");
     if (!made || !owned) {
         free(made);
         free(owned);
@@ -188,7 +205,10 @@ static ovoid_status hand_over(ovoid_context *context, const ov_found *found, siz
     }
     for (size_t i = 0; i < found->count; ++i)
         ov_ellipsoid_of_quadric(&found->quadrics[i], &made[i]);
-    memcpy(owned, found->owner, atoms * sizeof *owned);
+    if (by_unit)
+        spread_owners(&fitter->symmetry, found, owned);
+    else
+        memcpy(owned, found->owner, fitter->atoms * sizeof *owned);
     *ellipsoids = made;
     *owner = owned;
     return OVOID_OK;
@@ -204,46 +224,6 @@ static bool is_fitted_by_unit(const ovoid_fitter *fitter, const ovoid_fit_option
             options->adaptive.ellipsoids % order == 0);
 }
 
-/* The owners of all atoms, whose units follow one another among the ellipsoids. */
-static void spread_owners(const ov_symmetry *symmetry, const ov_found *unit, uint32_t *owner) {
-    for (size_t g = 0; g < symmetry->order; ++g) {
-        const uint32_t *from = unit->owner;
-        for (size_t u = 0; u < symmetry->units; ++u) {
-            uint32_t *const to = owner + symmetry->first[g * symmetry->units + u];
-            for (size_t n = 0; n < symmetry->atoms[u]; ++n)
-                to[n] = (uint32_t)(g * unit->count) + *from++;
-        }
-    }
-}
-
-/* The unit's model becomes that of all of them. */
-static ovoid_status repeat_unit(ovoid_fitter *fitter, ov_found *found, ovoid_fit_result *result) {
-    const ov_symmetry *const symmetry = &fitter->symmetry;
-    const size_t order = symmetry->order;
-    ov_found made = {.tolerance = found->tolerance, .fewest = order * found->fewest};
-    if (found->count > UINT32_MAX / order)
-        return ov_fail(fitter->context, OVOID_ERROR_LIMIT,
-                       "%zu units of %zu ellipsoids are more than %lu", order, found->count,
-                       (unsigned long)UINT32_MAX);
-    made.count = order * found->count;
-    made.quadrics = ov_alloc(fitter->context, made.count, sizeof *made.quadrics, "ellipsoids");
-    made.owner = ov_alloc(fitter->context, fitter->atoms, sizeof *made.owner, "owners");
-    if (!made.quadrics || !made.owner) {
-        ov_found_destroy(&made);
-        return OVOID_ERROR_MEMORY;
-    }
-    memcpy(made.quadrics, found->quadrics, found->count * sizeof *found->quadrics);
-    for (size_t n = found->count; n < made.count; ++n)
-        ov_quadric_move(&found->quadrics[n % found->count], &symmetry->motion[n / found->count],
-                        &made.quadrics[n]);
-    spread_owners(symmetry, found, made.owner);
-    ov_found_destroy(found);
-    *found = made;
-    result->ellipsoids *= order;
-    result->units = order;
-    return OVOID_OK;
-}
-
 static ovoid_status reach_by_unit(ovoid_fitter *fitter, const ovoid_fit_options *options,
                                   double began, ov_ranks *ranks, ov_found *found,
                                   ovoid_fit_result *result) {
@@ -252,10 +232,8 @@ static ovoid_status reach_by_unit(ovoid_fitter *fitter, const ovoid_fit_options 
     of_unit.adaptive.ellipsoids /= (uint32_t)images.count;
     ovoid_status status = ov_parts_reach(fitter->context, fitter->unit, fitter->symmetry.unit_atoms,
                                          &images, &of_unit, began, ranks, found, result);
-    if (found->count > 0) {
-        const ovoid_status repeated = repeat_unit(fitter, found, result);
-        status = repeated == OVOID_OK ? status : repeated;
-    }
+    result->ellipsoids *= images.count;
+    result->units = images.count;
     return status;
 }
 
@@ -282,19 +260,19 @@ static ovoid_status fit_adaptive(ovoid_fitter *fitter, const ovoid_fit_options *
                                  double began, ov_ranks *ranks, ovoid_ellipsoid **ellipsoids,
                                  uint32_t **owner, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
-    ovoid_context *const context = fitter->context;
     ov_found found = {0};
-    OV_TRY(ov_adaptive_check(context, &options->adaptive, fitter->atoms));
-    status = is_fitted_by_unit(fitter, options)
-                 ? reach_by_unit(fitter, options, began, ranks, &found, result)
-                 : reach_with_all(fitter, options, began, ranks, &found, result);
+    const bool by_unit = is_fitted_by_unit(fitter, options);
+    OV_TRY(ov_adaptive_check(fitter->context, &options->adaptive, fitter->atoms));
+    status = by_unit ? reach_by_unit(fitter, options, began, ranks, &found, result)
+                     : reach_with_all(fitter, options, began, ranks, &found, result);
     if (found.count > 0) {
-        if (hand_over(context, &found, fitter->atoms, ellipsoids, owner) != OVOID_OK) {
+        if (hand_over(fitter, &found, by_unit, ellipsoids, owner) != OVOID_OK) {
             status = OVOID_ERROR_MEMORY;
             goto cleanup;
         }
         ov_found_destroy(&fitter->last);
         fitter->last = found;
+        fitter->last_by_unit = by_unit;
         found = (ov_found){0};
     }
 cleanup:
@@ -335,16 +313,38 @@ cleanup:
     return ov_ranks_end(fitter->context, &ranks, status);
 }
 
+/* The motions of the symmetry as placements of its unit. */
+static ovoid_status copy_motions(const ovoid_fitter *fitter, ovoid_motion **placements) {
+    const ov_symmetry *const symmetry = &fitter->symmetry;
+    ovoid_motion *const made =
+        ov_alloc(fitter->context, symmetry->order, sizeof *made, "placements");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    for (size_t g = 0; g < symmetry->order; ++g) {
+        memcpy(made[g].rotation, symmetry->motion[g].rotation, sizeof made[g].rotation);
+        memcpy(made[g].translation, symmetry->motion[g].shift, sizeof made[g].translation);
+    }
+    *placements = made;
+    return OVOID_OK;
+}
+
 /* The model of what was found, and the last of the result. */
 static ovoid_status make_model(const ovoid_fitter *fitter, const ovoid_ellipsoid *ellipsoids,
                                uint32_t **owner, double began, ovoid_fit_result *result,
                                ovoid_model **model) {
-    const ovoid_status status =
-        ovoid_model_create(fitter->context, ellipsoids, (size_t)result->ellipsoids,
-                           fitter->surface.decay, fitter->surface.isovalue, model);
-    if (status == OVOID_OK)
-        ov_model_take_owner(*model, owner, fitter->atoms);
+    const bool by_unit = result->units != OVOID_UNKNOWN && result->units > 1;
+    const size_t units = by_unit ? (size_t)result->units : 1;
+    ovoid_motion *placements = NULL;
+    ovoid_status status = OVOID_OK;
+    if (by_unit)
+        OV_TRY(copy_motions(fitter, &placements));
+    OV_TRY(ovoid_model_create_placed(
+        fitter->context, ellipsoids, (size_t)result->ellipsoids / units, placements,
+        by_unit ? units : 0, fitter->surface.decay, fitter->surface.isovalue, model));
+    ov_model_take_owner(*model, owner, fitter->atoms);
     result->fit_seconds = ov_seconds() - began - result->sample_seconds;
+cleanup:
+    free(placements);
     return status;
 }
 
@@ -448,6 +448,7 @@ static ovoid_status found_create(ovoid_context *context, size_t count, size_t at
 static ovoid_status take_model(const ovoid_fitter *fitter, const ovoid_model *model,
                                ov_found *found) {
     ovoid_status status = OVOID_OK;
+    OV_TRY(ov_model_place(fitter->context, model));
     OV_TRY(found_create(fitter->context, ovoid_model_size(model), fitter->atoms, found));
     for (size_t i = 0; i < found->count; ++i)
         ov_quadric_of_ellipsoid(&ovoid_model_ellipsoids(model)[i], &found->quadrics[i]);
@@ -486,6 +487,33 @@ cleanup:
 }
 
 /* ---- other coordinates ----------------------------------------------------------------------- */
+
+/* The last model, if it is that of a unit, becomes that of all of them. */
+static ovoid_status repeat_last(ovoid_fitter *fitter) {
+    const ov_symmetry *const symmetry = &fitter->symmetry;
+    ov_found *const last = &fitter->last;
+    ov_found made = {0};
+    ovoid_status status = OVOID_OK;
+    if (!fitter->last_by_unit || last->count == 0)
+        return OVOID_OK;
+    OV_TRY(found_create(fitter->context, symmetry->order * last->count, fitter->atoms, &made));
+    for (size_t n = 0; n < made.count; ++n)
+        if (n < last->count)
+            made.quadrics[n] = last->quadrics[n];
+        else
+            ov_quadric_move(&last->quadrics[n % last->count], &symmetry->motion[n / last->count],
+                            &made.quadrics[n]);
+    spread_owners(symmetry, last, made.owner);
+    made.tolerance = last->tolerance;
+    made.fewest = symmetry->order * last->fewest;
+    ov_found_destroy(last);
+    *last = made;
+    fitter->last_by_unit = false;
+    made = (ov_found){0};
+cleanup:
+    ov_found_destroy(&made);
+    return status;
+}
 
 /* The last model where the atoms are now; *found is empty where there is none. */
 static ovoid_status move_model(const ovoid_fitter *fitter, const double *after, ov_found *found) {
@@ -532,6 +560,7 @@ ovoid_status ovoid_fitter_move(ovoid_context *context, ovoid_fitter *fitter, con
         memcpy(after + 4 * i, xyz + 3 * i, 3 * sizeof *xyz);
         after[4 * i + 3] = fitter->xyzr[4 * i + 3];
     }
+    OV_TRY(repeat_last(fitter));
     OV_TRY(move_model(fitter, after, &found));
     memcpy(fitter->xyzr, after, 4 * fitter->atoms * sizeof *after);
     ov_symmetry_destroy(&fitter->symmetry); /* the atoms may go anywhere */

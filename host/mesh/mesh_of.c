@@ -54,7 +54,7 @@ ovoid_status ov_field_check_ellipsoids(ovoid_context *context, const ovoid_field
 
 void ov_body_of_field(const ovoid_field *field, size_t i, ov_body *body) {
     if (field->model)
-        ov_body_of_ellipsoid(&field->model->ellipsoids[i], body);
+        ov_body_of_ellipsoid(&field->model->unit[i], body);
     else
         ov_body_of_ball(&field->quadrics[i], field->decay, body);
 }

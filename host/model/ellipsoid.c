@@ -17,6 +17,16 @@ void ov_rotation(const double angle[3], double r[3][3]) {
     r[2][2] = ca * cb;
 }
 
+/* Where alpha counts only as its sum or difference with gamma it is known to rounding only; gamma
+ * is that of R R_x(alpha)^T, so that R is kept all the same. */
+void ov_rotation_angles(double r[3][3], double angle[3]) {
+    const double cosine = hypot(r[0][0], r[1][0]);
+    angle[0] = cosine > 1e-15 ? atan2(r[2][1], r[2][2]) : 0.0;
+    angle[1] = atan2(r[2][0], cosine);
+    const double c = cos(angle[0]), s = sin(angle[0]);
+    angle[2] = atan2(s * r[0][2] - c * r[0][1], c * r[1][1] - s * r[1][2]);
+}
+
 void ov_rotation_derivatives(const double angle[3], double dr[3][3][3]) {
     const double ca = cos(angle[0]), sa = sin(angle[0]);
     const double cb = cos(angle[1]), sb = sin(angle[1]);
@@ -36,6 +46,17 @@ void ov_rotation_derivatives(const double angle[3], double dr[3][3][3]) {
             dr[1][i][j] = beta[i][j];
             dr[2][i][j] = gamma[i][j];
         }
+}
+
+void ov_ellipsoid_move(const ovoid_ellipsoid *ellipsoid, const ov_rigid *rigid,
+                       ovoid_ellipsoid *moved) {
+    double r[3][3], turned[3][3];
+    ov_rotation(ellipsoid->angle, r);
+    for (int p = 0; p < 3; ++p)
+        ov_rigid_turn(rigid, r[p], turned[p]);
+    *moved = *ellipsoid;
+    ov_rigid_move(rigid, ellipsoid->centre, moved->centre);
+    ov_rotation_angles(turned, moved->angle);
 }
 
 void ov_quadric_of_ellipsoid(const ovoid_ellipsoid *ellipsoid, ov_quadric *quadric) {

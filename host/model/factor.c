@@ -40,21 +40,10 @@ static void eigen(const double form[6], double value[3], double r[3][3]) {
     }
 }
 
-/* The angles of ov_rotation(), alpha 0 where only its sum or difference with gamma counts. Near
- * there alpha is known to rounding only; gamma is that of R R_x(alpha)^T, so that R is kept all the
- * same. */
-static void angles_of_rotation(double r[3][3], double angle[3]) {
-    const double cosine = hypot(r[0][0], r[1][0]);
-    angle[0] = cosine > 1e-15 ? atan2(r[2][1], r[2][2]) : 0.0;
-    angle[1] = atan2(r[2][0], cosine);
-    const double c = cos(angle[0]), s = sin(angle[0]);
-    angle[2] = atan2(s * r[0][2] - c * r[0][1], c * r[1][1] - s * r[1][2]);
-}
-
 void ov_ellipsoid_of_quadric(const ov_quadric *quadric, ovoid_ellipsoid *ellipsoid) {
     double r[3][3];
     eigen(quadric->a, ellipsoid->decay, r);
-    angles_of_rotation(r, ellipsoid->angle);
+    ov_rotation_angles(r, ellipsoid->angle);
     ellipsoid->amplitude = quadric->amplitude;
     for (int k = 0; k < 3; ++k)
         ellipsoid->centre[k] = quadric->centre[k];

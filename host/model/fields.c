@@ -23,7 +23,7 @@ static ovoid_field *make(ovoid_context *context, size_t count, double decay, dou
         return NULL;
     ov_tenant_join(context, &field->tenant, leave_device);
     field->quadrics = ov_alloc(context, count, sizeof *field->quadrics, "a field's Gaussians");
-    field->count = count;
+    field->count = field->unit = count;
     field->decay = decay;
     field->isovalue = isovalue;
     if (!field->quadrics)
@@ -61,7 +61,7 @@ ovoid_status ovoid_field_of_model(ovoid_context *context, const ovoid_model *mod
     OV_NEED(context, context);
     OV_NEED(context, model);
     OV_NEED(context, field);
-    ovoid_field *made = make(context, model->count, model->decay, model->isovalue);
+    ovoid_field *made = make(context, ovoid_model_size(model), model->decay, model->isovalue);
     if (!made)
         return OVOID_ERROR_MEMORY;
     const ovoid_status status = ov_model_copy(context, model, &made->model);
@@ -69,8 +69,9 @@ ovoid_status ovoid_field_of_model(ovoid_context *context, const ovoid_model *mod
         ovoid_field_destroy(&made);
         return status;
     }
-    for (size_t i = 0; i < model->count; ++i)
-        ov_quadric_of_ellipsoid(&model->ellipsoids[i], &made->quadrics[i]);
+    made->unit = model->unit_count;
+    for (size_t i = 0; i < made->count; ++i)
+        ov_quadric_of_ellipsoid(&made->model->unit[i], &made->quadrics[i]);
     *field = made;
     return OVOID_OK;
 }

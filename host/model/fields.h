@@ -11,9 +11,10 @@
 
 struct ovoid_field {
     ov_tenant tenant;
-    ovoid_model *model; /* a copy, of a model's field; NULL of a molecule's */
+    ovoid_model *model; /* a copy without placements, of a model's field; NULL of a molecule's */
     ov_quadric *quadrics;
     size_t count;
+    size_t unit; /* terms of a unit, of a model with placements; of others all */
     double decay, isovalue;
     ov_evaluator evaluator; /* of the opened device, where `loaded` */
     bool loaded;

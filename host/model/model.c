@@ -35,38 +35,82 @@ static ovoid_status check_ellipsoid(ovoid_context *context, const ovoid_ellipsoi
     return OVOID_OK;
 }
 
+static ovoid_status check_placed(ovoid_context *context, const ovoid_ellipsoid *ellipsoids,
+                                 size_t count, const ovoid_motion *placements,
+                                 size_t placement_count) {
+    for (size_t n = 0; n < placement_count; n++) {
+        const char *problem = ov_placement_problem(&placements[n]);
+        if (problem)
+            return ov_fail(context, OVOID_ERROR_ARGUMENT, "placement %zu: %s", n, problem);
+    }
+    for (size_t i = 0; i < count && placement_count > 0; i++) {
+        const char *problem = ov_placed_problem(&ellipsoids[i]);
+        if (problem)
+            return ov_fail(context, OVOID_ERROR_ARGUMENT, "ellipsoid %zu: %s", i, problem);
+    }
+    return ov_placements_check(context, placement_count, count);
+}
+
+static ovoid_status check_surface(ovoid_context *context, double decay, double isovalue) {
+    if (!isfinite(decay) || decay <= 0.0)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay is %g and must be positive", decay);
+    if (!isfinite(isovalue) || isovalue <= 0.0)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue is %g and must be positive",
+                       isovalue);
+    return OVOID_OK;
+}
+
+static ovoid_status create(ovoid_context *context, const ovoid_ellipsoid *ellipsoids, size_t count,
+                           const ovoid_motion *placements, size_t placement_count, double decay,
+                           double isovalue, ovoid_model **model) {
+    ovoid_status status = OVOID_OK;
+    ovoid_model *made = NULL;
+    if (!count)
+        return ov_fail(context, OVOID_ERROR_EMPTY, "a model needs at least one ellipsoid");
+    OV_TRY(check_surface(context, decay, isovalue));
+    for (size_t i = 0; i < count; i++)
+        OV_TRY(check_ellipsoid(context, &ellipsoids[i], i));
+    OV_TRY(check_placed(context, ellipsoids, count, placements, placement_count));
+    made = ov_alloc(context, 1, sizeof *made, "a model");
+    if (!made)
+        return OVOID_ERROR_MEMORY;
+    made->unit_count = count;
+    made->placement_count = placement_count;
+    made->decay = decay;
+    made->isovalue = isovalue;
+    made->unit = ov_copy(context, ellipsoids, count, sizeof *ellipsoids, "a model's ellipsoids");
+    if (placement_count > 0)
+        made->placements = ov_copy(context, placements, placement_count, sizeof *placements,
+                                   "a model's placements");
+    if (!made->unit || (placement_count > 0 && !made->placements))
+        OV_TRY(OVOID_ERROR_MEMORY);
+    *model = made;
+    made = NULL;
+cleanup:
+    ovoid_model_destroy(&made);
+    return status;
+}
+
 ovoid_status ovoid_model_create(ovoid_context *context, const ovoid_ellipsoid *ellipsoids,
                                 size_t count, double decay, double isovalue, ovoid_model **model) {
     OV_NEED(context, context);
     OV_NEED(context, model);
     if (count)
         OV_NEED(context, ellipsoids);
-    if (!count)
-        return ov_fail(context, OVOID_ERROR_EMPTY, "a model needs at least one ellipsoid");
-    if (!isfinite(decay) || decay <= 0.0)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "decay is %g and must be positive", decay);
-    if (!isfinite(isovalue) || isovalue <= 0.0)
-        return ov_fail(context, OVOID_ERROR_ARGUMENT, "isovalue is %g and must be positive",
-                       isovalue);
-    ovoid_status status = OVOID_OK;
-    for (size_t i = 0; i < count; i++)
-        if ((status = check_ellipsoid(context, &ellipsoids[i], i)) != OVOID_OK)
-            return status;
+    return create(context, ellipsoids, count, NULL, 0, decay, isovalue, model);
+}
 
-    ovoid_model *made = ov_alloc(context, 1, sizeof *made, "a model");
-    if (!made)
-        return OVOID_ERROR_MEMORY;
-    made->ellipsoids = ov_alloc(context, count, sizeof *ellipsoids, "a model's ellipsoids");
-    if (!made->ellipsoids) {
-        ovoid_model_destroy(&made);
-        return OVOID_ERROR_MEMORY;
-    }
-    memcpy(made->ellipsoids, ellipsoids, count * sizeof *ellipsoids);
-    made->count = count;
-    made->decay = decay;
-    made->isovalue = isovalue;
-    *model = made;
-    return OVOID_OK;
+ovoid_status ovoid_model_create_placed(ovoid_context *context, const ovoid_ellipsoid *ellipsoids,
+                                       size_t count, const ovoid_motion *placements,
+                                       size_t placement_count, double decay, double isovalue,
+                                       ovoid_model **model) {
+    OV_NEED(context, context);
+    OV_NEED(context, model);
+    if (count)
+        OV_NEED(context, ellipsoids);
+    if (placement_count)
+        OV_NEED(context, placements);
+    return create(context, ellipsoids, count, placements, placement_count, decay, isovalue, model);
 }
 
 void ovoid_model_destroy(ovoid_model **model) {
@@ -75,18 +119,25 @@ void ovoid_model_destroy(ovoid_model **model) {
     for (size_t i = 0; i < (*model)->note_count; i++)
         free((*model)->notes[i]);
     free((*model)->notes);
-    free((*model)->ellipsoids);
+    free((*model)->unit);
+    free((*model)->placements);
+    free((*model)->placed);
     free((*model)->owner);
     free(*model);
     *model = NULL;
 }
 
 size_t ovoid_model_size(const ovoid_model *model) {
-    return model ? model->count : 0;
+    if (!model)
+        return 0;
+    return model->placement_count > 0 ? model->placement_count * model->unit_count
+                                      : model->unit_count;
 }
 
 const ovoid_ellipsoid *ovoid_model_ellipsoids(const ovoid_model *model) {
-    return model ? model->ellipsoids : NULL;
+    if (!model || model->placement_count == 0)
+        return model ? model->unit : NULL;
+    return ov_model_place(NULL, model) == OVOID_OK ? model->placed : NULL;
 }
 
 double ovoid_model_decay(const ovoid_model *model) {
@@ -123,7 +174,7 @@ static bool is_control(char c) {
 bool ov_model_key_valid(const char *key) {
     if (key[0] == '\0' || key[0] == '#' || key[0] == ' ')
         return false;
-    if (strcmp(key, "decay") == 0 || strcmp(key, "isovalue") == 0)
+    if (strcmp(key, "decay") == 0 || strcmp(key, "isovalue") == 0 || strcmp(key, "placement") == 0)
         return false;
     for (const char *c = key; *c; c++)
         if (*c == ':' || is_control(*c))
@@ -148,8 +199,9 @@ ovoid_status ov_model_add_note(ovoid_context *context, ovoid_model *model, const
 ovoid_status ov_model_copy(ovoid_context *context, const ovoid_model *model, ovoid_model **copy) {
     ovoid_status status = OVOID_OK;
     ovoid_model *made = NULL;
-    OV_TRY(ovoid_model_create(context, model->ellipsoids, model->count, model->decay,
-                              model->isovalue, &made));
+    OV_TRY(ov_model_place(context, model));
+    OV_TRY(ovoid_model_create(context, ovoid_model_ellipsoids(model), ovoid_model_size(model),
+                              model->decay, model->isovalue, &made));
     for (size_t i = 0; i < model->note_count; i++)
         OV_TRY(ov_model_add_note(context, made, model->notes[i], strlen(model->notes[i])));
     *copy = made;

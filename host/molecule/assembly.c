@@ -1,4 +1,6 @@
 #include "molecule/assembly.h"
+
+#include "base/rigid.h"
 #include "molecule/reader.h"
 
 #include <math.h>
@@ -515,21 +517,8 @@ static ovoid_status no_such(const ov_reader *reader) {
                    ov_text_name(reader->text), wanted, text);
 }
 
-/* Rotations alone keep the shape of what they turn. */
 static ovoid_status check_rotation(const ov_reader *reader, const ovoid_placement *p) {
-    const double *r = p->rotation, small = 1e-2;
-    double worst = 0.0;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double sum = i == j ? -1.0 : 0.0;
-            for (int k = 0; k < 3; k++)
-                sum += r[3 * i + k] * r[3 * j + k];
-            worst = fmax(worst, fabs(sum));
-        }
-    const double determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) -
-                               r[1] * (r[3] * r[8] - r[5] * r[6]) +
-                               r[2] * (r[3] * r[7] - r[4] * r[6]);
-    if (worst <= small && determinant > 0)
+    if (ov_is_rotation(p->rotation, 1e-2))
         return OVOID_OK;
     return ov_fail(reader->context, OVOID_ERROR_FORMAT,
                    "%s: assembly %s: a placement that is no rotation and translation",

@@ -120,3 +120,10 @@ void ov_image_place(ovoid_image *image, uint32_t left, uint32_t top, const ovoid
         memcpy(image->pixels + 4 * ((size_t)(top + row) * image->width + left),
                from->pixels + 4 * (size_t)row * from->width, (size_t)4 * from->width);
 }
+
+bool ovoid_image_radii(const ovoid_image *image, double radii[2]) {
+    const bool known = image && image->radii[1] > 0.0;
+    if (known && radii)
+        memcpy(radii, image->radii, sizeof image->radii);
+    return known;
+}

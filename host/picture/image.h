@@ -13,6 +13,7 @@ struct ovoid_image {
     uint8_t *pixels; /* RGBA, sRGB, not premultiplied, rows from the top */
     uint64_t covered;
     double range;
+    double radii[2]; /* of colours by radius, else 0, 0 */
 };
 
 /* All pixels are transparent black. Positions below are in pixels from the upper left corner of the

@@ -47,11 +47,9 @@ static ov_colour colour_of_oklab(const double lab[3]) {
     return colour;
 }
 
-void ov_palette_diverging(ov_colour palette[OV_PALETTE_SIZE]) {
-    /* Darker toward both ends, which read apart without colour vision too. */
-    static const uint32_t stops[] = {0x1f3f8fff, 0x3f7fc4ff, 0x9cc8e6ff, 0xf2f0ecff,
-                                     0xf0b59aff, 0xd4604aff, 0x8f1a2eff};
-    const int last = (int)(sizeof stops / sizeof stops[0]) - 1;
+/* Colours between the stops, as many as a palette has. */
+static void fill_between(const uint32_t *stops, int count, ov_colour palette[OV_PALETTE_SIZE]) {
+    const int last = count - 1;
     for (int i = 0; i < OV_PALETTE_SIZE; ++i) {
         const double at = (double)i * last / (OV_PALETTE_SIZE - 1);
         const int stop = at < last ? (int)at : last - 1;
@@ -64,6 +62,19 @@ void ov_palette_diverging(ov_colour palette[OV_PALETTE_SIZE]) {
             a[k] += (at - stop) * (b[k] - a[k]);
         palette[i] = colour_of_oklab(a);
     }
+}
+
+void ov_palette_diverging(ov_colour palette[OV_PALETTE_SIZE]) {
+    /* Darker toward both ends, which read apart without colour vision too. */
+    static const uint32_t stops[] = {0x1f3f8fff, 0x3f7fc4ff, 0x9cc8e6ff, 0xf2f0ecff,
+                                     0xf0b59aff, 0xd4604aff, 0x8f1a2eff};
+    fill_between(stops, (int)(sizeof stops / sizeof *stops), palette);
+}
+
+void ov_palette_radial(ov_colour palette[OV_PALETTE_SIZE]) {
+    static const uint32_t stops[] = {0x34569cff, 0x3f93b0ff, 0x7fbf9aff,
+                                     0xe8d98cff, 0xe59a50ff, 0xbf4a3fff};
+    fill_between(stops, (int)(sizeof stops / sizeof *stops), palette);
 }
 
 void ov_palette_distinct(ov_colour palette[OV_PALETTE_SIZE]) {

@@ -24,6 +24,9 @@ double ov_srgb_decode(uint8_t encoded);
 /* Blue over white to red: from the least to the greatest value. Linear light. */
 void ov_palette_diverging(ov_colour palette[OV_PALETTE_SIZE]);
 
+/* From the inside to the outside of something large: blue, green, yellow, red. Linear light. */
+void ov_palette_radial(ov_colour palette[OV_PALETTE_SIZE]);
+
 /* Colours that neighbours in a list can be told apart by. Linear light. */
 void ov_palette_distinct(ov_colour palette[OV_PALETTE_SIZE]);
 

@@ -5,6 +5,7 @@
 #include "model/fields.h"
 #include "picture/colour_bar.h"
 #include "picture/image.h"
+#include "picture/radii.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -47,7 +48,7 @@ void ovoid_picture_options_init(ovoid_picture_options *options, size_t size) {
 typedef struct scene {
     const ov_quadric *quadrics;
     ov_quadric *seen;
-    size_t count;
+    size_t count, unit;
     ov_hits hits;
     bool traced;
 } scene;
@@ -61,7 +62,8 @@ typedef struct painter {
     uint32_t width, height; /* of one picture */
     uint32_t reserve;       /* pixels at the right that are kept for the colour bar */
     double range;           /* of the difference */
-    ov_colour diverging[OV_PALETTE_SIZE], distinct[OV_PALETTE_SIZE];
+    ov_colour diverging[OV_PALETTE_SIZE], distinct[OV_PALETTE_SIZE], radial[OV_PALETTE_SIZE];
+    cl_uint palette_size;
     ov_tracer tracer;
     ov_kernel shade;
     ov_buffer palette, taps, pixels, cover;
@@ -76,6 +78,21 @@ static bool needs_original(ovoid_view view) {
 
 static bool needs_model(ovoid_view view) {
     return view != OVOID_VIEW_ORIGINAL;
+}
+
+/* Colours of a view that does not have them would be lost. */
+static ovoid_status check_colouring(ovoid_context *context, const ovoid_picture_options *options) {
+    const ovoid_view view = options->view;
+    if ((unsigned)options->colouring > OVOID_PICTURE_BY_UNIT)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "there is no colouring %d of a picture",
+                       (int)options->colouring);
+    if (options->colouring == OVOID_PICTURE_BY_UNIT && view != OVOID_VIEW_ELLIPSOIDS)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT, "colours by unit are those of ellipsoids");
+    if (options->colouring == OVOID_PICTURE_BY_RADIUS && view != OVOID_VIEW_ORIGINAL &&
+        view != OVOID_VIEW_MODEL && view != OVOID_VIEW_ELLIPSOIDS)
+        return ov_fail(context, OVOID_ERROR_ARGUMENT,
+                       "colours by radius are those of one surface, or of ellipsoids");
+    return OVOID_OK;
 }
 
 static ovoid_status check_numbers(ovoid_context *context, const ovoid_picture_options *options) {
@@ -116,7 +133,8 @@ static ovoid_status check(ovoid_context *context, const ovoid_field *original,
         return ov_fail(context, OVOID_ERROR_ARGUMENT,
                        "%u rays across a pixel are not within 1 to %d", (unsigned)options->samples,
                        OVOID_PICTURE_SAMPLES_MAX);
-    return check_numbers(context, options);
+    const ovoid_status status = check_colouring(context, options);
+    return status == OVOID_OK ? check_numbers(context, options) : status;
 }
 
 /* ---- the scene ---------------------------------------------------------------------------- */
@@ -129,6 +147,7 @@ static ovoid_status make_scene(ovoid_context *context, const ovoid_field *field,
         return status;
     s->quadrics = field->quadrics;
     s->count = field->count;
+    s->unit = field->unit;
     s->seen = ov_alloc(context, field->count, sizeof *s->seen, "a picture's terms");
     return s->seen ? OVOID_OK : OVOID_ERROR_MEMORY;
 }
@@ -288,6 +307,26 @@ cleanup:
 /* How a pixel gets its colour. */
 typedef enum paint { PAINT_PLAIN = 0, PAINT_DISTANCE, PAINT_INDEX } paint;
 
+/* The colours that the shader looks up. */
+static ovoid_status upload_palette(painter *p, const scene *base, paint by) {
+    const bool by_unit = by == PAINT_INDEX && p->options->colouring == OVOID_PICTURE_BY_UNIT;
+    const ov_colour *const own = by == PAINT_INDEX                                  ? p->distinct
+                                 : p->options->colouring == OVOID_PICTURE_BY_RADIUS ? p->radial
+                                                                                    : p->diverging;
+    p->palette_size = by_unit ? (cl_uint)base->count : OV_PALETTE_SIZE;
+    if (!by_unit)
+        return ov_buffer_put(p->context, &p->palette, own, sizeof p->diverging, "colours");
+    ov_colour *const each = ov_alloc(p->context, base->count, sizeof *each, "colours");
+    if (!each)
+        return OVOID_ERROR_MEMORY;
+    for (size_t i = 0; i < base->count; ++i)
+        each[i] = p->distinct[i / base->unit % OV_PALETTE_SIZE];
+    const ovoid_status status =
+        ov_buffer_put(p->context, &p->palette, each, base->count * sizeof *each, "colours");
+    free(each);
+    return status;
+}
+
 /* A spiral that is denser in the middle, so that both narrow clefts and wide pockets are met. */
 static ovoid_status upload_taps(painter *p) {
     float taps[2 * TAPS];
@@ -323,7 +362,7 @@ static ovoid_status launch_shade(painter *p, const scene *base, paint by, const 
                               lights->fade};
     const cl_uint width = p->width, height = p->height, samples = p->options->samples;
     const cl_uint blocks = (cl_uint)ov_rays_blocks(&p->rays), how = (cl_uint)by;
-    const cl_uint palette_size = OV_PALETTE_SIZE, glass = pane != NULL, taps = TAPS;
+    const cl_uint palette_size = p->palette_size, glass = pane != NULL, taps = TAPS;
     const cl_float spacing = (cl_float)p->rays.spacing;
     const cl_float range = (cl_float)(p->range > 0.0 ? p->range : 1.0), reach = lights->reach;
     const cl_float4 own = linear_float4(colour), tint = linear_float4(p->options->original);
@@ -357,14 +396,13 @@ static ovoid_status shade(painter *p, const scene *base, paint by, const scene *
                           uint32_t colour, ovoid_image *image) {
     ovoid_status status = OVOID_OK;
     const size_t count = (size_t)p->width * p->height;
-    const ov_colour *const palette = by == PAINT_INDEX ? p->distinct : p->diverging;
     if (!p->shade.handle) {
         OV_TRY(ov_kernel_create(p->context, "render", "shade", &p->shade));
         OV_TRY(upload_taps(p));
         OV_TRY(ov_buffer_reserve(p->context, &p->pixels, 4 * count, "the pixels of an image"));
         OV_TRY(ov_buffer_reserve(p->context, &p->cover, count, "the pixels of an image"));
     }
-    OV_TRY(ov_buffer_put(p->context, &p->palette, palette, sizeof p->diverging, "colours"));
+    OV_TRY(upload_palette(p, base, by));
     OV_TRY(launch_shade(p, base, by, pane, colour));
     OV_TRY(ov_buffer_read(p->context, &p->pixels, 0, image->pixels, 4 * count));
     OV_TRY(count_covered(p, image));
@@ -423,17 +461,29 @@ static void draw_bar(painter *p, ovoid_image *image) {
 
 /* ---- pictures ----------------------------------------------------------------------------- */
 
+/* One scene by itself, by radius if that is asked for, else as it is painted without. */
+static ovoid_status paint_alone(painter *p, scene *s, paint plain, uint32_t colour,
+                                ovoid_image *image) {
+    double middle[3];
+    if (p->options->colouring != OVOID_PICTURE_BY_RADIUS)
+        return shade(p, s, plain, NULL, colour, image);
+    ov_middle_of(s->seen, s->count, middle);
+    const ovoid_status status =
+        ov_hits_by_radius(p->context, &p->rays, middle, &s->hits, image->radii);
+    return status == OVOID_OK ? shade(p, s, PAINT_DISTANCE, NULL, colour, image) : status;
+}
+
 static ovoid_status paint_view(painter *p, ovoid_view view, bool centres, ovoid_image *image) {
     ovoid_status status = OVOID_OK;
     const ovoid_picture_options *const o = p->options;
     switch (view) {
     case OVOID_VIEW_ORIGINAL:
         OV_TRY(trace_surface(p, &p->original));
-        OV_TRY(shade(p, &p->original, PAINT_PLAIN, NULL, o->original, image));
+        OV_TRY(paint_alone(p, &p->original, PAINT_PLAIN, o->original, image));
         break;
     case OVOID_VIEW_MODEL:
         OV_TRY(trace_surface(p, &p->model));
-        OV_TRY(shade(p, &p->model, PAINT_PLAIN, NULL, o->model, image));
+        OV_TRY(paint_alone(p, &p->model, PAINT_PLAIN, o->model, image));
         break;
     case OVOID_VIEW_OVERLAY:
         OV_TRY(trace_surface(p, &p->original));
@@ -450,7 +500,7 @@ static ovoid_status paint_view(painter *p, ovoid_view view, bool centres, ovoid_
         break;
     case OVOID_VIEW_ELLIPSOIDS:
         OV_TRY(trace_ellipsoids(p));
-        OV_TRY(shade(p, &p->model, PAINT_INDEX, NULL, o->model, image));
+        OV_TRY(paint_alone(p, &p->model, PAINT_INDEX, o->model, image));
         break;
     case OVOID_VIEW_PANEL:
         break; /* is made of others */
@@ -519,6 +569,7 @@ ovoid_status ovoid_render(ovoid_context *context, ovoid_field *original, ovoid_f
     const bool panel = o.view == OVOID_VIEW_PANEL;
     ov_palette_diverging(p.diverging);
     ov_palette_distinct(p.distinct);
+    ov_palette_radial(p.radial);
     OV_TRY(make_scene(context, original, &p.original));
     OV_TRY(make_scene(context, model, &p.model));
     place_camera(&p);

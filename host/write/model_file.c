@@ -11,11 +11,23 @@
 
 /* ---- writing ------------------------------------------------------------------------------ */
 
+static void write_placement(const ovoid_motion *placement, FILE *stream) {
+    double values[OV_PLACEMENT_VALUES];
+    memcpy(values, placement, sizeof values);
+    fputs("# placement:", stream);
+    for (size_t i = 0; i < OV_PLACEMENT_VALUES; i++)
+        fprintf(stream, " %.17g", values[i]);
+    putc('\n', stream);
+}
+
 static void write_header(const ovoid_model *model, FILE *stream) {
-    fprintf(stream, "# %s %d\n", OV_MODEL_FILE_MAGIC, OV_MODEL_FILE_VERSION);
+    fprintf(stream, "# %s %d\n", OV_MODEL_FILE_MAGIC,
+            model->placement_count > 0 ? OV_MODEL_FILE_VERSION_PLACED : OV_MODEL_FILE_VERSION);
     fprintf(stream, "# decay: %.9g\n# isovalue: %.9g\n", model->decay, model->isovalue);
     for (size_t i = 0; i < model->note_count; i++)
         fprintf(stream, "# %s\n", model->notes[i]);
+    for (size_t n = 0; n < model->placement_count; n++)
+        write_placement(&model->placements[n], stream);
     for (size_t i = 0; i < OV_ELLIPSOID_VALUES; i++)
         fprintf(stream, "%s%s", i ? " " : "# ", ov_ellipsoid_value_name(i));
     putc('\n', stream);
@@ -40,9 +52,9 @@ ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model,
     OV_TRY(ov_locale_enter(context, &locale));
     OV_TRY(ov_output_open(context, path, &output));
     write_header(model, output.stream);
-    for (size_t i = 0; i < model->count && !ferror(output.stream); i++) {
-        OV_TRY(ov_progress_turn(context, i, model->count));
-        write_ellipsoid(&model->ellipsoids[i], output.stream);
+    for (size_t i = 0; i < model->unit_count && !ferror(output.stream); i++) {
+        OV_TRY(ov_progress_turn(context, i, model->unit_count));
+        write_ellipsoid(&model->unit[i], output.stream);
     }
     status = ov_output_commit(context, &output); /* reports a failed write too */
 
@@ -68,8 +80,11 @@ typedef struct reader {
     char line[LINE_BYTES]; /* without the line end */
     size_t length;
     ovoid_model *model; /* notes go here; the rest at the end */
+    long version;
     ovoid_ellipsoid *ellipsoids;
     size_t count, capacity;
+    ovoid_motion *placements;
+    size_t placement_count, placement_capacity;
     size_t notes_bytes;
     double decay, isovalue; /* NAN until given */
 } reader;
@@ -128,6 +143,21 @@ static ovoid_status read_number(const reader *r, size_t at, size_t length, const
     return isfinite(*number) ? OVOID_OK : fail_value(r, at, what, "is too large");
 }
 
+/* The last ellipsoid that was read is one of a unit. */
+static ovoid_status check_placed(const reader *r) {
+    const char *problem = ov_placed_problem(&r->ellipsoids[r->count - 1]);
+    if (problem)
+        return fail_value(r, 0, "ellipsoid:", problem);
+    if (r->placement_count == 0)
+        return fail_at(r, 0, "a model file of version 2 has placements before its ellipsoids");
+    if (r->count > UINT32_MAX / r->placement_count)
+        return ov_fail(r->context, OVOID_ERROR_LIMIT,
+                       "%s:%llu:1: the %zu placements of so many ellipsoids are more than %lu",
+                       r->name, (unsigned long long)r->line_number, r->placement_count,
+                       (unsigned long)UINT32_MAX);
+    return OVOID_OK;
+}
+
 static ovoid_status read_ellipsoid(reader *r) {
     double values[OV_ELLIPSOID_VALUES];
     size_t at = skip_blanks(r, 0);
@@ -148,8 +178,51 @@ static ovoid_status read_ellipsoid(reader *r) {
         return fail_at(r, at, "more than the ten numbers of an ellipsoid");
     ovoid_status status = ov_grow(r->context, &r->ellipsoids, &r->capacity, r->count + 1,
                                   sizeof *r->ellipsoids, "a model's ellipsoids");
-    if (status == OVOID_OK)
-        memcpy(&r->ellipsoids[r->count++], values, sizeof values);
+    if (status != OVOID_OK)
+        return status;
+    memcpy(&r->ellipsoids[r->count++], values, sizeof values);
+    return r->version == OV_MODEL_FILE_VERSION_PLACED ? check_placed(r) : OVOID_OK;
+}
+
+/* The numbers of a placement, from a byte of the line on. */
+static ovoid_status read_motion(const reader *r, size_t at, ovoid_motion *placement) {
+    static const char *const names[OV_PLACEMENT_VALUES] = {"r11", "r12", "r13", "r21", "r22", "r23",
+                                                           "r31", "r32", "r33", "t1",  "t2",  "t3"};
+    double values[OV_PLACEMENT_VALUES];
+    for (size_t i = 0; i < OV_PLACEMENT_VALUES; i++) {
+        if (at == r->length)
+            return fail_value(r, at, names[i], "is missing: a placement is twelve numbers");
+        const size_t length = strcspn(r->line + at, " \t");
+        const ovoid_status status = read_number(r, at, length, names[i], &values[i]);
+        if (status != OVOID_OK)
+            return status;
+        at = skip_blanks(r, at + length);
+    }
+    if (at != r->length)
+        return fail_at(r, at, "more than the twelve numbers of a placement");
+    memcpy(placement, values, sizeof values);
+    return OVOID_OK;
+}
+
+/* Of a line "# placement: ...", whose numbers begin at `value`. */
+static ovoid_status read_placement(reader *r, size_t key, size_t value) {
+    ovoid_status status = OVOID_OK;
+    ovoid_motion placement;
+    if (r->version != OV_MODEL_FILE_VERSION_PLACED)
+        return fail_at(r, key, "a file with placements begins with '# ovoid model 2'");
+    if (r->count > 0)
+        return fail_at(r, key, "placements come before the first ellipsoid");
+    OV_TRY(read_motion(r, value, &placement));
+    const char *problem = ov_placement_problem(&placement);
+    if (problem)
+        return fail_value(r, value, "placement:", problem);
+    if (r->placement_count == OVOID_MODEL_PLACEMENTS_MAX)
+        return ov_fail(r->context, OVOID_ERROR_LIMIT, "%s:%llu:1: more than %d placements", r->name,
+                       (unsigned long long)r->line_number, OVOID_MODEL_PLACEMENTS_MAX);
+    OV_TRY(ov_grow(r->context, &r->placements, &r->placement_capacity, r->placement_count + 1,
+                   sizeof *r->placements, "a model's placements"));
+    r->placements[r->placement_count++] = placement;
+cleanup:
     return status;
 }
 
@@ -166,27 +239,34 @@ static ovoid_status read_magic(reader *r) {
     long version = strtol(r->line + text, &end, 10);
     if (end == r->line + text || *end)
         return fail_at(r, text, "the version of the model file is not a number");
-    if (version != OV_MODEL_FILE_VERSION)
-        return ov_fail(r->context, OVOID_ERROR_FORMAT,
-                       "%s:%llu:%zu: the model file has version %ld, but Ovoid %s reads version %d",
-                       r->name, (unsigned long long)r->line_number, text + 1, version,
-                       ovoid_version(), OV_MODEL_FILE_VERSION);
+    if (version != OV_MODEL_FILE_VERSION && version != OV_MODEL_FILE_VERSION_PLACED)
+        return ov_fail(
+            r->context, OVOID_ERROR_FORMAT,
+            "%s:%llu:%zu: the model file has version %ld, but Ovoid %s reads versions %d and %d",
+            r->name, (unsigned long long)r->line_number, text + 1, version, ovoid_version(),
+            OV_MODEL_FILE_VERSION, OV_MODEL_FILE_VERSION_PLACED);
+    r->version = version;
     return OVOID_OK;
 }
 
-/* A '#' line: the surface's constants, a note, or a remark of no concern. Only the lines before the
- * first ellipsoid are the header. */
+/* A '#' line: the surface's constants, a placement, a note, or a remark of no concern. Only the
+ * lines before the first ellipsoid are the header. */
 static ovoid_status read_hash_line(reader *r) {
     size_t key = skip_blanks(r, skip_blanks(r, 0) + 1);
     size_t colon = key + strcspn(r->line + key, ":");
-    if (r->count || colon == r->length || (r->line[colon + 1] && r->line[colon + 1] != ' '))
+    if (colon == r->length || (r->line[colon + 1] && r->line[colon + 1] != ' '))
         return OVOID_OK;
     size_t value = skip_blanks(r, colon + 1);
     r->line[colon] = '\0';
+    bool is_placement = strcmp(r->line + key, "placement") == 0;
     bool is_decay = strcmp(r->line + key, "decay") == 0;
     bool is_isovalue = strcmp(r->line + key, "isovalue") == 0;
     bool is_note = ov_model_key_valid(r->line + key);
     r->line[colon] = ':';
+    if (is_placement)
+        return read_placement(r, key, value);
+    if (r->count)
+        return OVOID_OK;
     if (is_note) {
         r->notes_bytes += r->length - key + NOTE_ROOM;
         if (r->notes_bytes > NOTES_BYTES_MAX)
@@ -255,9 +335,12 @@ ovoid_status ovoid_model_read(ovoid_context *context, const char *path, ovoid_mo
     OV_TRY(read_lines(r));
     r->model->decay = isnan(r->decay) ? OVOID_DEFAULT_DECAY : r->decay;
     r->model->isovalue = isnan(r->isovalue) ? OVOID_DEFAULT_ISOVALUE : r->isovalue;
-    r->model->ellipsoids = r->ellipsoids;
-    r->model->count = r->count;
+    r->model->unit = r->ellipsoids;
+    r->model->unit_count = r->count;
+    r->model->placements = r->placements;
+    r->model->placement_count = r->placement_count;
     r->ellipsoids = NULL;
+    r->placements = NULL;
     *model = r->model;
     r->model = NULL;
 
@@ -267,6 +350,7 @@ cleanup:
         fclose(r->stream);
     ovoid_model_destroy(&r->model);
     free(r->ellipsoids);
+    free(r->placements);
     free(r);
     ov_progress_end(context);
     return status;

@@ -113,7 +113,8 @@ typedef struct ovoid_exchange { /* 24 bytes */
 } ovoid_exchange;
 
 /* Assemblies (molecule.h) that motions carry into themselves, such as capsids: one unit of them is
- * fitted among its images, and repeated. */
+ * fitted among its images, and the model is that of the unit and its placements, the motions: see
+ * ovoid_model_placements(). */
 typedef enum ovoid_symmetry {
     OVOID_SYMMETRY_USE = 0, /* where there is one, and the number of ellipsoids that is asked for,
                                if one is, can be shared out equally */
@@ -216,8 +217,8 @@ typedef struct ovoid_fit_result {
     uint64_t counts[OVOID_COUNTS];  /* by ovoid_count: what the fit made of them, of l1 without
                                        sampling */
     uint64_t parts;                 /* that the molecule was cut into: 1 as a whole */
-    uint64_t units; /* of a symmetric assembly, of which one was fitted, in so many parts; the model
-                       has all of them, unit after unit. 1: all atoms were fitted */
+    uint64_t units; /* of a symmetric assembly, of which one was fitted, in so many parts: the
+                       placements of the model. 1: all atoms were fitted */
 } ovoid_fit_result;
 
 /* Nothing known; size is sizeof *result. */

@@ -30,9 +30,11 @@ OVOID_API ovoid_status ovoid_model_create(ovoid_context *context, const ovoid_el
                                           ovoid_model **model);
 OVOID_API void ovoid_model_destroy(ovoid_model **model);
 
+/* How many ellipsoids there are; of a model with placements those of all its units. */
 OVOID_API size_t ovoid_model_size(const ovoid_model *model);
 
-/* 10 * size contiguous doubles, those of ovoid_ellipsoid for each. */
+/* 10 * size contiguous doubles, those of ovoid_ellipsoid for each; of a model with placements unit
+ * after unit. Those are computed when first asked for: NULL where there is no memory for them. */
 OVOID_API const ovoid_ellipsoid *ovoid_model_ellipsoids(const ovoid_model *model);
 OVOID_API double ovoid_model_decay(const ovoid_model *model);
 OVOID_API double ovoid_model_isovalue(const ovoid_model *model);
@@ -58,14 +60,60 @@ OVOID_API const char *ovoid_model_note(const ovoid_model *model, size_t index);
 OVOID_API ovoid_status ovoid_model_annotate(ovoid_context *context, ovoid_model *model,
                                             const char *key, const char *value);
 
+/* ---- units ---------------------------------------------------------------------------------- */
+
+/*
+ * The model of a symmetric assembly may be that of one unit, and placements: it stands for the unit
+ * in each of them. Whatever takes a model (fields, and with them meshes, measures and pictures;
+ * exports; fitters) and ovoid_model_size(), ovoid_model_ellipsoids() and ovoid_model_owner() are
+ * about all ellipsoids, those of every placement; a program that knows of no placements computes
+ * what it should.
+ */
+
+/* x' = rotation x + translation. */
+typedef struct ovoid_motion { /* 96 bytes */
+    double rotation[9];       /* row by row */
+    double translation[3];    /* angstrom */
+} ovoid_motion;
+
+enum { OVOID_MODEL_PLACEMENTS_MAX = 100000 };
+
+/* As ovoid_model_create(), of the ellipsoids of a unit in each of these placements (copied), which
+ * are numbered from 0 in this order: ellipsoid i of the unit is ellipsoid n * count + i of the
+ * model in placement n. No placements, 0 of them: the unit as it stands, an ordinary model.
+ * Rotations are orthogonal to within 0.03 and do not mirror; translations and centres are within
+ * 1e100 angstrom. More than OVOID_MODEL_PLACEMENTS_MAX placements, or 2^32 - 1 ellipsoids in all,
+ * are OVOID_ERROR_LIMIT. */
+OVOID_API ovoid_status ovoid_model_create_placed(ovoid_context *context,
+                                                 const ovoid_ellipsoid *ellipsoids, size_t count,
+                                                 const ovoid_motion *placements,
+                                                 size_t placement_count, double decay,
+                                                 double isovalue, ovoid_model **model);
+
+/* The placements of the unit, *count of them; NULL and 0 of a model without. */
+OVOID_API const ovoid_motion *ovoid_model_placements(const ovoid_model *model, size_t *count);
+
+/* The unit's ellipsoids, before they are placed; of a model without placements all there are. */
+OVOID_API size_t ovoid_model_unit_size(const ovoid_model *model);
+OVOID_API const ovoid_ellipsoid *ovoid_model_unit_ellipsoids(const ovoid_model *model);
+
+/* Makes a model of all ellipsoids, those of ovoid_model_ellipsoids(), without placements; notes and
+ * owners are copied. */
+OVOID_API ovoid_status ovoid_model_expand(ovoid_context *context, const ovoid_model *model,
+                                          ovoid_model **expanded);
+
+/* ---- files ---------------------------------------------------------------------------------- */
+
 /* Reads a model file (.ovoid). "-" is standard input. Bad lines are OVOID_ERROR_FORMAT with
  * "file:line:column: reason". */
 OVOID_API ovoid_status ovoid_model_read(ovoid_context *context, const char *path,
                                         ovoid_model **model);
 
 /* Writes a model file: '#' header lines, a column line, one ellipsoid per line with nine
- * significant digits. "-" is standard output. A file is written beside its final place and renamed,
- * so that `path` never holds half a model. */
+ * significant digits. Of a model with placements the header holds these, and the lines are the
+ * unit's; such a file has version 2, which versions of Ovoid that know of no placements refuse. "-"
+ * is standard output. A file is written beside its final place and renamed, so that `path` never
+ * holds half a model. */
 OVOID_API ovoid_status ovoid_model_write(ovoid_context *context, const ovoid_model *model,
                                          const char *path);
 

@@ -22,6 +22,15 @@ typedef enum ovoid_view {
     OVOID_VIEW_PANEL         /* original, model with centres, and overlay side by side */
 } ovoid_view;
 
+/* What colours a surface. */
+typedef enum ovoid_picture_colouring {
+    OVOID_PICTURE_PLAIN = 0, /* one colour; each ellipsoid has its own */
+    OVOID_PICTURE_BY_RADIUS, /* views original, model and ellipsoids: how far what is seen is from
+                                the middle of the atoms' or ellipsoids' centres, blue for near, red
+                                for far */
+    OVOID_PICTURE_BY_UNIT    /* view ellipsoids: those of a placement of the model's unit alike */
+} ovoid_picture_colouring;
+
 #define OVOID_PICTURE_SIDE_MAX 16384 /* pixels */
 #define OVOID_PICTURE_SAMPLES_MAX 8  /* rays across a pixel */
 
@@ -47,6 +56,7 @@ typedef struct ovoid_picture_options {
     bool colour_bar;     /* of the difference */
     double range;        /* of the difference's colours, angstrom to either side; 0: fits 99 % of
                             what is seen */
+    ovoid_picture_colouring colouring; /* PLAIN; one that the view does not have is refused */
 } ovoid_picture_options;
 
 /* OVOID_VIEW_ORIGINAL, 1200 by 900 pixels of 3^2 rays, isovalue 0, default direction, fit to size,
@@ -82,6 +92,10 @@ OVOID_API uint64_t ovoid_image_covered(const ovoid_image *image);
 
 /* The range of colours of OVOID_VIEW_DIFFERENCE, angstrom to either side; 0 for other views. */
 OVOID_API double ovoid_image_range(const ovoid_image *image);
+
+/* Of OVOID_PICTURE_BY_RADIUS the distances from the middle at which colours begin and end,
+ * angstrom; false, and nothing, of others. */
+OVOID_API bool ovoid_image_radii(const ovoid_image *image, double radii[2]);
 
 /* Writes a PNG file, whole or not at all. "-" is standard output. */
 OVOID_API ovoid_status ovoid_image_write(ovoid_context *context, const ovoid_image *image,

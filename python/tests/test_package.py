@@ -209,6 +209,65 @@ def test_assembly(tmp_path):
     assert pair.atoms["name"].tolist() == [b"CA"] and pair.residues["name"].tolist() == [b"ALA"]
 
 
+# As it stands, and half a turn.
+TURN = [
+    ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [0, 0, 0]),
+    ([[-1, 0, 0], [0, -1, 0], [0, 0, 1]], [60, 20, 0]),
+]
+
+
+def test_models_of_units(device, tmp_path):
+    shape = np.diag([4.0, 2.0, 1.0])
+    unit = ovoid.Model([[0, 0, 0], [3, 1, 0]], [shape, shape], [3, 2], placements=TURN)
+    assert len(unit) == 4 and unit.centres[2:].tolist() == [[60, 20, 0], [57, 19, 0]]
+    assert unit.unit_ellipsoids.shape == (2, 10) and len(unit.placements) == 2
+    assert unit.placements["translation"].tolist() == [[0, 0, 0], [60, 20, 0]]
+    everything = unit.expand()
+    assert len(everything.placements) == 0 and everything.unit_ellipsoids.shape == (4, 10)
+    assert np.array_equal(everything.ellipsoids, unit.ellipsoids)
+    points = np.array([[0.5, 0, 0], [59, 20, 1], [30, 10, 0]])
+    assert np.array_equal(unit.field()(points), everything.field()(points))
+    assert unit.mesh().area == everything.mesh().area
+    how = {"view": "ellipsoids", "size": (60, 40), "samples": 1}
+    by_unit = unit.render(**how, colour_by="unit").pixels
+    assert not np.array_equal(by_unit, unit.render(**how).pixels)
+    assert not np.array_equal(by_unit, everything.render(**how, colour_by="unit").pixels)
+    with pytest.raises(ovoid.ArgumentError, match="colours by unit are those of ellipsoids"):
+        unit.render(colour_by="unit")
+    unit.write(tmp_path / "unit.ovoid")
+    for again in (ovoid.read_model(tmp_path / "unit.ovoid"), pickle.loads(pickle.dumps(unit))):
+        assert np.array_equal(again.placements, unit.placements)
+        assert np.allclose(again.centres, unit.centres, atol=1e-7)
+        assert np.allclose(again.matrices, unit.matrices, atol=1e-8)
+    same = ovoid.Model(unit.centres[:2], [shape, shape], [3, 2], placements=unit.placements)
+    assert np.array_equal(same.centres, unit.centres)
+    with pytest.raises(ovoid.ArgumentError, match="placement 0: its nine first numbers are no"):
+        ovoid.Model([[0, 0, 0]], [shape], [1], placements=[(np.diag([1, 1, -1]), [0, 0, 0])])
+    with pytest.raises(ovoid.ArgumentError, match="placements' translations must have the shape"):
+        ovoid.Model([[0, 0, 0]], [shape], [1], placements=[(np.eye(3), [0, 0, 0, 0, 0, 0])])
+
+
+def test_assemblies_are_fitted_by_unit(device, tmp_path):
+    path = tmp_path / "two.pdb"
+    remark = "REMARK 350   BIOMT{} {:3} {:9.6f} {:9.6f} {:9.6f} {:14.5f}\n"
+    rows = [(k + 1, n + 1, *TURN[n][0][k], TURN[n][1][k]) for n in range(2) for k in range(3)]
+    atom = "ATOM  {0:5}  CA  ALA A{0:4}    {1:8.3f}{2:8.3f}{3:8.3f}  1.00  0.00           C\n"
+    path.write_text(
+        "REMARK 350 BIOMOLECULE: 1\nREMARK 350 APPLY THE FOLLOWING TO CHAINS: A\n"
+        + "".join(remark.format(*row) for row in rows)
+        + "".join(atom.format(i + 1, 1.5 * i, i % 3, i % 2) for i in range(8))
+    )
+    molecule = ovoid.read(path, assembly="1")
+    model = molecule.fit(ellipsoids=6)
+    assert model.report.units == 2 and len(model) == 6 and len(model.placements) == 2
+    everything = model.expand()
+    assert everything.report is model.report and everything.molecule is molecule
+    assert np.array_equal(everything.owner, model.owner) and model.owner.max() == 5
+    assert np.array_equal(everything.ellipsoids, model.ellipsoids)
+    assert everything.notes == model.notes
+    assert everything.measure(molecule) == model.measure(molecule)
+
+
 def test_pictures(peptide, model, tmp_path):
     image = model.render(peptide, view="difference", size=(160, 120), samples=1)
     assert image.pixels.shape == (120, 160, 4) and image.range > 0

@@ -52,6 +52,23 @@ run "$OVOID" render a.xyzr a.ovoid $small --view model --no-centres -o other.png
 expect_code 0
 cmp -s other.png model.png && fail "--no-centres should change the picture"
 
+# Colours by where things are.
+run "$OVOID" render a.xyzr $small --colour-by radius -o other.png
+expect_code 0
+expect_out " Å from the middle, blue, to "
+cmp -s other.png original.png && fail "--colour-by radius should change the picture"
+run "$OVOID" render a.ovoid $small --view ellipsoids --colour-by unit -o other.png
+expect_code 0
+run "$OVOID" render a.xyzr a.ovoid $small --colour-by radius -o c.png
+expect_code 2
+expect_err "--colour-by radius is for the views original, model and ellipsoids, not 'overlay'"
+run "$OVOID" render a.ovoid $small --colour-by unit -o c.png
+expect_code 2
+expect_err "--colour-by unit is for the view ellipsoids, not 'model'"
+run "$OVOID" render a.ovoid $small --colour-by chain -o c.png
+expect_code 2
+expect_err "--colour-by takes radius, unit or none, not 'chain'"
+
 # To standard output, the summary apart.
 run "$OVOID" render a.xyzr $small -o -
 expect_code 0

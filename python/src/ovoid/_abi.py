@@ -273,6 +273,7 @@ PictureOptions = _structure(
     ("centres", c_bool),
     ("colour_bar", c_bool),
     ("range", c_double),
+    ("colouring", c_int),
 )
 
 Check = _structure(
@@ -315,7 +316,9 @@ RESIDUE = [("name", "S8"), ("chain", "S12"), ("number", "<i4"), ("insertion", "S
 RESIDUE += [("reserved", "V3"), ("first", "<u4")]
 PLACEMENT: list[Any] = [("rotation", "<f8", (3, 3)), ("translation", "<f8", (3,))]
 PLACEMENT += [("part", "<u4"), ("reserved", "<u4"), ("first", "<u8")]
+MOTION: list[Any] = PLACEMENT[:2]
 MAPPED = {"ovoid_atom": 24, "ovoid_residue": 32, "ovoid_placement": 112, "ovoid_ellipsoid": 80}
+MAPPED["ovoid_motion"] = 96
 
 _P = c_void_p
 _DOUBLES = POINTER(c_double)
@@ -373,9 +376,17 @@ _FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "fitter_start_from": (c_int, [_P, _P, _P]),
     "fitter_move": (c_int, [_P, _P, _P]),
     "model_create": (c_int, [_P, _P, c_size_t, c_double, c_double, POINTER(_P)]),
+    "model_create_placed": (
+        c_int,
+        [_P, _P, c_size_t, _P, c_size_t, c_double, c_double, POINTER(_P)],
+    ),
     "model_destroy": (None, [POINTER(_P)]),
     "model_size": (c_size_t, [_P]),
     "model_ellipsoids": (_P, [_P]),
+    "model_placements": (_P, [_P, _SIZE]),
+    "model_unit_size": (c_size_t, [_P]),
+    "model_unit_ellipsoids": (_P, [_P]),
+    "model_expand": (c_int, [_P, _P, POINTER(_P)]),
     "model_decay": (c_double, [_P]),
     "model_isovalue": (c_double, [_P]),
     "model_owner": (_P, [_P]),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from . import _abi
 from ._abi import lib
 from ._context import Context, Handle, ProgressLike, encode, host_context, is_missing
 from ._field import Field
@@ -17,7 +18,7 @@ from ._measure import Measures, measure_fields
 from ._scene import Scene
 from ._surface import DECAY, ISOVALUE, SPACING, Pictured
 from ._views import Doubles, doubles, view
-from .errors import ArgumentError, EmptyError, FileError
+from .errors import ArgumentError, EmptyError, FileError, OutOfMemoryError
 
 if TYPE_CHECKING:
     from ._fit import FitReport
@@ -48,6 +49,24 @@ def _angles(r: Doubles) -> Doubles:
     return np.stack([alpha, beta, gamma], axis=1)
 
 
+def _motions(placements: Any) -> npt.NDArray[np.void]:
+    """Placements as an array of the library's, from that, those of a molecule, or pairs."""
+    named = getattr(placements, "dtype", None) is not None and placements.dtype.names
+    if named:
+        rotations, translations = placements["rotation"], placements["translation"]
+    else:
+        pairs = list(placements)
+        rotations = np.array([rotation for rotation, _ in pairs]).reshape(-1, 3, 3)
+        translations = np.array([translation for _, translation in pairs]).reshape(-1, 3)
+    turns = doubles(rotations, (None, 3, 3), "placements' rotations")
+    motions = np.empty(len(turns), np.dtype(_abi.MOTION))
+    motions["rotation"] = turns
+    motions["translation"] = doubles(
+        translations, (len(turns), 3), "placements' translations", " (Å)"
+    )
+    return motions
+
+
 def _frozen(array: Any) -> Any:
     array.flags.writeable = False
     return array
@@ -57,6 +76,9 @@ class Model(Pictured):
     """Ellipsoids: Gaussians a·exp(-(x-μ)ᵀA(x-μ)) whose sum has a surface like a molecule's.
 
     It comes from `Molecule.fit` or `read_model`, or is made of arrays. All arrays are read-only.
+
+    The model of a symmetric assembly is that of one unit, and its placements; its arrays, and all
+    that is made of it, are those of all units.
 
     Parameters
     ----------
@@ -68,6 +90,10 @@ class Model(Pictured):
         a, above 0.
     decay, isovalue : float
         d (Å⁻²) and c of the surface that the model stands for.
+    placements : array_like, optional
+        The ellipsoids are those of a unit, which is in each of these: an array with the fields
+        rotation (3, 3) and translation (Å), as `placements` of a model or a molecule is, or pairs
+        of the two.
 
     Attributes
     ----------
@@ -88,6 +114,7 @@ class Model(Pictured):
         *,
         decay: float = DECAY,
         isovalue: float = ISOVALUE,
+        placements: Any = None,
     ) -> None:
         places = doubles(centres, (None, 3), "centres", " (Å)")
         n = len(places)
@@ -104,13 +131,22 @@ class Model(Pictured):
         rows = axes.transpose(0, 2, 1)
         rows[np.linalg.det(rows) < 0, 2] *= -1
         table = np.column_stack([heights, 0.5 / variance, places, _angles(rows)])
-        self._make(table, decay, isovalue)
+        self._make(table, decay, isovalue, _motions([] if placements is None else placements))
 
-    def _make(self, table: Doubles, decay: float, isovalue: float) -> None:
+    def _make(
+        self, table: Doubles, decay: float, isovalue: float, motions: npt.NDArray[np.void]
+    ) -> None:
         made = ctypes.c_void_p()
         array = np.ascontiguousarray(table)
         host_context()._call(
-            lib.model_create, array.ctypes.data, len(array), decay, isovalue, ctypes.byref(made)
+            lib.model_create_placed,
+            array.ctypes.data,
+            len(array),
+            motions.ctypes.data,
+            len(motions),
+            decay,
+            isovalue,
+            ctypes.byref(made),
         )
         assert made.value
         self._handle = Handle(made.value, lib.model_destroy)
@@ -141,7 +177,7 @@ class Model(Pictured):
         return self._handle.pointer
 
     def __len__(self) -> int:
-        """How many ellipsoids there are."""
+        """How many ellipsoids there are, of all units."""
         return int(lib.model_size(self._pointer))
 
     def __repr__(self) -> str:
@@ -155,8 +191,8 @@ class Model(Pictured):
 
     def __reduce__(self) -> Any:
         owner = None if self.owner is None else np.array(self.owner)
-        table = np.array(self.ellipsoids)
-        return _restore, (table, self.decay, self.isovalue, self.report, owner, self.notes)
+        unit = np.array(self.unit_ellipsoids), self.decay, self.isovalue, np.array(self.placements)
+        return _restore, (*unit, self.report, owner, self.notes)
 
     # ---- ellipsoids ----
 
@@ -165,8 +201,47 @@ class Model(Pictured):
         """Array of float64, shape (n, 10), a view: amplitude, three decays (Å⁻²), centre (Å), and
         the three angles (radian) of the paper's convention, as in model files."""
         address = lib.model_ellipsoids(self._pointer)
+        if not address:
+            raise OutOfMemoryError(f"ovoid: no memory for {len(self)} ellipsoids")
         array: Doubles = view(address, np.float64, (len(self), 10), self._handle)
         return array
+
+    @cached_property
+    def placements(self) -> npt.NDArray[np.void]:
+        """Structured array: rotation (3, 3) and translation (Å) of each placement of the unit;
+        empty where the model is not made of any."""
+        count = ctypes.c_size_t()
+        address = lib.model_placements(self._pointer, ctypes.byref(count))
+        array: npt.NDArray[np.void] = view(
+            address, np.dtype(_abi.MOTION), (count.value,), self._handle
+        )
+        return array
+
+    @cached_property
+    def unit_ellipsoids(self) -> Doubles:
+        """Array of float64, shape (m, 10), a view: as `ellipsoids`, those of the unit, before it is
+        placed; of a model without placements all there are."""
+        address = lib.model_unit_ellipsoids(self._pointer)
+        count = int(lib.model_unit_size(self._pointer))
+        array: Doubles = view(address, np.float64, (count, 10), self._handle)
+        return array
+
+    def expand(self) -> Model:
+        """The same model without placements: all ellipsoids, also in its file.
+
+        Returns
+        -------
+        Model
+        """
+        made = ctypes.c_void_p()
+        host_context()._call(lib.model_expand, self._pointer, ctypes.byref(made))
+        assert made.value
+        model = Model._of(made.value)
+        model.report = self.report
+        model.molecule = self.molecule
+        if "owner" in self.__dict__:
+            model.__dict__["owner"] = self.owner
+        return model
 
     @property
     def amplitudes(self) -> Doubles:
@@ -320,10 +395,16 @@ class Model(Pictured):
 
 
 def _restore(
-    table: Any, decay: float, isovalue: float, report: Any, owner: Any, notes: dict[str, str]
+    table: Any,
+    decay: float,
+    isovalue: float,
+    placements: Any,
+    report: Any,
+    owner: Any,
+    notes: dict[str, str],
 ) -> Model:
     model = Model.__new__(Model)
-    model._make(table, decay, isovalue)
+    model._make(table, decay, isovalue, placements)
     model.report = report
     model.__dict__["owner"] = owner
     for key, value in notes.items():

@@ -17,6 +17,7 @@ from ._context import Handle, ProgressLike, encode, host_context
 from ._field import Field
 from ._views import view
 
+COLOURINGS = ("none", "radius", "unit")
 VIEWS = ("original", "model", "overlay", "difference", "ellipsoids", "panel")
 
 
@@ -63,6 +64,7 @@ def render(
     samples: int | None = None,
     isovalue: float | None = None,
     rotation: tuple[float, float, float] | None = None,
+    colour_by: str = "none",
     transparent: bool = False,
     progress: ProgressLike = False,
 ) -> Image:
@@ -76,6 +78,7 @@ def render(
         samples=samples,
         isovalue=isovalue,
         rotation=None if rotation is None else (ctypes.c_double * 3)(*rotation),
+        colouring=choice(colour_by, COLOURINGS, "colour_by"),
         background=0xFFFFFF00 if transparent else None,
     )
     made = ctypes.c_void_p()

@@ -143,6 +143,7 @@ class Pictured(Surface):
         isovalue: float | None = None,
         samples: int | None = None,
         rotation: tuple[float, float, float] | None = None,
+        colour_by: str = "none",
         transparent: bool = False,
         progress: ProgressLike = False,
         context: Context | None = None,
@@ -166,6 +167,9 @@ class Pictured(Surface):
             Rays across a pixel.
         rotation : (x, y, z), optional
             Radian about the screen's axes.
+        colour_by : {"none", "radius", "unit"}
+            "radius" colours one surface, or ellipsoids, by how far from the middle what is seen is,
+            "unit" ellipsoids by the placement of the model's unit.
         transparent : bool
             Instead of the white background.
         progress : bool or callable
@@ -189,6 +193,7 @@ class Pictured(Surface):
             samples=samples,
             isovalue=isovalue,
             rotation=rotation,
+            colour_by=colour_by,
             transparent=transparent,
             progress=progress,
         )

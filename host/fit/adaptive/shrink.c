@@ -218,13 +218,18 @@ static void take_back(const ov_trial *best, shrinking *s) {
     s->next.count = count;
 }
 
-/* Takes back the merges nearest to the spots, and lets what is near adapt. */
+/* Asks for more at the spots, takes back the merges nearest to those that are further off than
+ * `limit` (angstrom), and lets what is near all spots adapt. */
 static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spots *spots,
-                             shrinking *s) {
+                             double limit, shrinking *s) {
     ovoid_status status = OVOID_OK;
+    ov_spots far = {.spot = spots->spot}; /* the worst come first */
+    while (far.count < spots->count && far.spot[far.count].distance > limit)
+        ++far.count;
     OV_TRY(ov_adaptive_emphasise(f, spots));
     memset(s->chosen, 0, s->next.count * sizeof *s->chosen);
-    OV_TRY(choose_nearest(f, s, spots));
+    if (far.count > 0)
+        OV_TRY(choose_nearest(f, s, &far));
     OV_TRY(remember(f, best, s));
     take_back(best, s);
     OV_TRY(choose_near(f, spots, ov_tuned.shrink_back, s));
@@ -233,16 +238,25 @@ cleanup:
     return status;
 }
 
-/* Where merging was too much: takes merges back, and where that is not enough, grows. */
+/* How far off a spot may be in round n of settling before the merge there is taken back: less in
+ * each round, and nothing once merges have had all their chances. */
+static double patience(double tolerance, uint32_t n) {
+    const double left = 1.0 - (double)n / (double)ov_tuned.shrink_chances;
+    return n < ov_tuned.shrink_chances ? tolerance * (1.0 + (ov_tuned.shrink_chance - 1.0) * left)
+                                       : 0.0;
+}
+
+/* Where merging was too much: asks for more there, takes back the merges that this does not help,
+ * and where that is not enough, grows. */
 static ovoid_status settle(ov_adaptive *f, double tolerance, const ov_trial *best, shrinking *s) {
     ovoid_status status = OVOID_OK;
     ov_spots spots = {0};
     const ov_growing how = {
         .stage = "shrink", .most = best->count - 1, .rounds = ov_tuned.shrink_grow_rounds};
+    const uint32_t rounds = ov_tuned.shrink_chances + ov_tuned.shrink_back_rounds;
     OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
-    for (uint32_t n = 0;
-         n < ov_tuned.shrink_back_rounds && spots.count > 0 && s->next.count < best->count; ++n) {
-        OV_TRY(back_off(f, best, &spots, s));
+    for (uint32_t n = 0; n < rounds && spots.count > 0 && s->next.count < best->count; ++n) {
+        OV_TRY(back_off(f, best, &spots, patience(tolerance, n), s));
         OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
     }
     OV_TRY(ov_owner_merge(f->context, s->parents, s->next.count, best->count, best->owner, f->atoms,
@@ -293,7 +307,8 @@ ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, const ov_shrin
         }
         OV_TRY(adapt(f, &s));
         OV_TRY(settle(f, tolerance, best, &s));
-        if (s.next.count < before && ov_trial_holds(&s.next, tolerance))
+        if (s.next.count <= before &&
+            ov_trial_holds(&s.next, tolerance)) /* as many: refined anew */
             ov_trial_swap(&s.next, best);
         choose_share(&s, tries, before - best->count);
         idle = is_idle(&s, how, tries, best->count);

@@ -64,13 +64,14 @@ static ovoid_status grow_start(ov_adaptive *f, double tolerance, ov_trial *t) {
     ov_spots spots = {0};
     ov_growing how = {.stage = "grow", .most = f->atoms, .rounds = ov_tuned.grow_rounds};
     how.patience = is_frame(f) ? ov_tuned.motion_patience : 0;
+    const double too_many = is_frame(f) ? ov_tuned.motion_too_many : ov_tuned.start_too_many;
     OV_TRY(ov_adaptive_take_start(f, t));
     OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
     if (f->options->adaptive.steps == 0 || ov_trial_holds(t, tolerance))
         goto cleanup;
     OV_TRY(ov_adaptive_refine_fully(f, t, "refine"));
     OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
-    if ((double)spots.count <= ov_tuned.start_too_many * (double)t->count)
+    if ((double)spots.count <= too_many * (double)t->count)
         OV_TRY(ov_adaptive_grow(f, tolerance, &how, t, &spots));
 cleanup:
     ov_spots_destroy(&spots);

@@ -31,7 +31,7 @@ typedef struct shrinking {
 
 /* Parts of a molecule have seams to keep, which chances make worse where images meet. */
 static settling settling_of(const ov_adaptive *f) {
-    if (f->around.atoms > 0)
+    if (f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0)
         return (settling){0, ov_tuned.shrink_part_back_rounds, ov_tuned.refine_local_steps,
                           ov_tuned.spots_emphasis, ov_tuned.spots_emphasis_reach};
     return (settling){ov_tuned.shrink_chances, ov_tuned.shrink_back_rounds, ov_tuned.shrink_steps,
@@ -243,8 +243,7 @@ static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spot
     ov_spots far = {.spot = spots->spot}; /* the worst come first */
     while (far.count < spots->count && far.spot[far.count].distance > limit)
         ++far.count;
-    OV_TRY(
-        ov_adaptive_emphasise(f, spots, ov_tuned.shrink_emphasis_reach, ov_tuned.shrink_emphasis));
+    OV_TRY(ov_adaptive_emphasise(f, spots, s->how.reach, s->how.emphasis));
     memset(s->chosen, 0, s->next.count * sizeof *s->chosen);
     if (far.count > 0)
         OV_TRY(choose_nearest(f, s, &far));
@@ -324,8 +323,7 @@ ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, const ov_shrin
         }
         OV_TRY(adapt(f, &s));
         OV_TRY(settle(f, tolerance, best, &s));
-        if (s.next.count <= before &&
-            ov_trial_holds(&s.next, tolerance)) /* as many: refined anew */
+        if (s.next.count < before + (s.how.chances > 0) && ov_trial_holds(&s.next, tolerance))
             ov_trial_swap(&s.next, best);
         choose_share(&s, tries, before - best->count);
         idle = is_idle(&s, how, tries, best->count);

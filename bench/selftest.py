@@ -80,6 +80,8 @@ CHANGES = [
     ("pack_leaves", "distance.cl", "v[k] = c - a;", "v[k] = 1.001f * (c - a);"),
     ("distances", "distance.cl", "*leaf = found < bound ? child : *leaf;\n            bound = min(bound, found);",
      "*leaf = found < bound ? child : *leaf;\n            bound = min(bound, 1.001f * found);"),
+    ("triangle_distances", "distance.cl", "squared[k] = ov_nearest(&corners, 3,",
+     "squared[k] = 1.001f * ov_nearest(&corners, 3,"),
     ("trace", "render.cl", "    return z;\n}\n\n/* First point", "    return 1.0005f * z;\n}\n\n/* First point"),
     ("trace_ellipsoids", "render.cl", "const ov_vec met = dz + t.z;", "const ov_vec met = 1.001f * dz + t.z;"),
     ("compare", "render.cl", "(sum - level) / max(steep, 1e-6f)", "(sum - 1.01f * level) / max(steep, 1e-6f)"),

@@ -132,37 +132,64 @@ static inline ov_wide ov_dot(const ov_wide *a, const ov_wide *b) {
     return fma(a[0], b[0], fma(a[1], b[1], a[2] * b[2]));
 }
 
-/* Least squared distance from the point to a leaf's triangles: of the nearest point of each
- * triangle's plane, moved into the triangle, and of the nearest points of its three edges. Each of
- * the four lies in the triangle, and one of them is its nearest point, so that rounding never finds
- * anything nearer than there is. */
-static inline float ov_leaf_distance(float px, float py, float pz, __global const float *leaf) {
+/* A point, or the three corners of a triangle, from which distances are measured. */
+typedef struct ov_from {
+    float x[3], y[3], z[3];
+} ov_from;
+
+static inline ov_from ov_from_load(__global const float *points, const uint count) {
+    ov_from from;
+#pragma unroll
+    for (uint i = 0; i < count; ++i) {
+        from.x[i] = points[3 * i];
+        from.y[i] = points[3 * i + 1];
+        from.z[i] = points[3 * i + 2];
+    }
+    return from;
+}
+
+/* Squared distances from a point to some triangles of a leaf, the k-th vector of them: of the
+ * nearest point of each triangle's plane, moved into the triangle, and of the nearest points of its
+ * three edges. Each of the four lies in the triangle, and one of them is its nearest point, so that
+ * rounding never finds anything nearer than there is. */
+static inline ov_wide ov_triangle_distances(float px, float py, float pz,
+                                            __global const float *leaf, uint k) {
+    ov_wide w[3], u[3], v[3], g[3], h[3], across[3];
+    w[0] = px - OV_WIDE_LOAD(k, leaf);
+    w[1] = py - OV_WIDE_LOAD(k, leaf + OV_LEAF);
+    w[2] = pz - OV_WIDE_LOAD(k, leaf + 2 * OV_LEAF);
+#pragma unroll
+    for (uint axis = 0; axis < 3; ++axis) {
+        u[axis] = OV_WIDE_LOAD(k, leaf + (3 + axis) * OV_LEAF);
+        v[axis] = OV_WIDE_LOAD(k, leaf + (6 + axis) * OV_LEAF);
+        g[axis] = OV_WIDE_LOAD(k, leaf + (9 + axis) * OV_LEAF);
+        h[axis] = OV_WIDE_LOAD(k, leaf + (12 + axis) * OV_LEAF);
+        across[axis] = v[axis] - u[axis];
+    }
+    const ov_wide one = 1.0f, zero = 0.0f;
+    const ov_wide along_u = ov_dot(w, u), along_v = ov_dot(w, v), uv = ov_dot(u, across);
+    const ov_wide on_u = clamp(along_u * OV_WIDE_LOAD(k, leaf + 15 * OV_LEAF), zero, one);
+    const ov_wide on_v = clamp(along_v * OV_WIDE_LOAD(k, leaf + 16 * OV_LEAF), zero, one);
+    const ov_wide on_w =
+        clamp((along_v - along_u - uv) * OV_WIDE_LOAD(k, leaf + 17 * OV_LEAF), zero, one);
+    const ov_wide s = clamp(ov_dot(w, g), zero, one);
+    const ov_wide t = clamp(ov_dot(w, h), zero, one - s);
+    const ov_wide edges = min(min(ov_residue(w, u, v, on_u, zero), ov_residue(w, u, v, zero, on_v)),
+                              ov_residue(w, u, v, one - on_w, on_w));
+    return min(edges, ov_residue(w, u, v, s, t));
+}
+
+/* Of a leaf's triangles the least of their squared distances: to the point, or to that of the
+ * points which is farthest from the triangle. */
+static inline float ov_leaf_distance(const ov_from *from, const uint points,
+                                     __global const float *leaf) {
     float least = INFINITY;
     for (uint k = 0; k < OV_LEAF / OV_WIDE; ++k) {
-        ov_wide w[3], u[3], v[3], g[3], h[3], across[3];
-        w[0] = px - OV_WIDE_LOAD(k, leaf);
-        w[1] = py - OV_WIDE_LOAD(k, leaf + OV_LEAF);
-        w[2] = pz - OV_WIDE_LOAD(k, leaf + 2 * OV_LEAF);
-#pragma unroll
-        for (uint axis = 0; axis < 3; ++axis) {
-            u[axis] = OV_WIDE_LOAD(k, leaf + (3 + axis) * OV_LEAF);
-            v[axis] = OV_WIDE_LOAD(k, leaf + (6 + axis) * OV_LEAF);
-            g[axis] = OV_WIDE_LOAD(k, leaf + (9 + axis) * OV_LEAF);
-            h[axis] = OV_WIDE_LOAD(k, leaf + (12 + axis) * OV_LEAF);
-            across[axis] = v[axis] - u[axis];
-        }
-        const ov_wide one = 1.0f, zero = 0.0f;
-        const ov_wide along_u = ov_dot(w, u), along_v = ov_dot(w, v), uv = ov_dot(u, across);
-        const ov_wide on_u = clamp(along_u * OV_WIDE_LOAD(k, leaf + 15 * OV_LEAF), zero, one);
-        const ov_wide on_v = clamp(along_v * OV_WIDE_LOAD(k, leaf + 16 * OV_LEAF), zero, one);
-        const ov_wide on_w =
-            clamp((along_v - along_u - uv) * OV_WIDE_LOAD(k, leaf + 17 * OV_LEAF), zero, one);
-        const ov_wide s = clamp(ov_dot(w, g), zero, one);
-        const ov_wide t = clamp(ov_dot(w, h), zero, one - s);
-        const ov_wide edges =
-            min(min(ov_residue(w, u, v, on_u, zero), ov_residue(w, u, v, zero, on_v)),
-                ov_residue(w, u, v, one - on_w, on_w));
-        least = min(least, ov_least(min(edges, ov_residue(w, u, v, s, t))));
+        ov_wide farthest = ov_triangle_distances(from->x[0], from->y[0], from->z[0], leaf, k);
+        for (uint i = 1; i < points; ++i)
+            farthest =
+                max(farthest, ov_triangle_distances(from->x[i], from->y[i], from->z[i], leaf, k));
+        least = min(least, ov_least(farthest));
     }
     return least;
 }
@@ -179,30 +206,40 @@ static inline float ov_corner_distance(float px, float py, float pz, __global co
     return least;
 }
 
-/* Squared distances to the boxes of a group; absent boxes are infinitely far. */
-static inline void ov_box_distances(float px, float py, float pz, __global const float *group,
-                                    float *distance) {
+/* Squared distances from a point to some boxes of a group, the k-th vector of them; absent boxes
+ * are infinitely far. */
+static inline ov_wide ov_box_distance(float px, float py, float pz, __global const float *group,
+                                      uint k) {
+    const ov_wide zero = 0.0f;
+    const ov_wide x =
+        max(max(OV_WIDE_LOAD(k, group) - px, px - OV_WIDE_LOAD(k, group + 3 * OV_GROUP)), zero);
+    const ov_wide y =
+        max(max(OV_WIDE_LOAD(k, group + OV_GROUP) - py, py - OV_WIDE_LOAD(k, group + 4 * OV_GROUP)),
+            zero);
+    const ov_wide z = max(
+        max(OV_WIDE_LOAD(k, group + 2 * OV_GROUP) - pz, pz - OV_WIDE_LOAD(k, group + 5 * OV_GROUP)),
+        zero);
+    return fma(x, x, fma(y, y, z * z));
+}
+
+/* Squared distances to the boxes of a group, of several points those of the farthest. */
+static inline void ov_box_distances(const ov_from *from, const uint points,
+                                    __global const float *group, float *distance) {
 #pragma unroll
     for (uint k = 0; k < OV_GROUP / OV_WIDE; ++k) {
-        const ov_wide zero = 0.0f;
-        const ov_wide x =
-            max(max(OV_WIDE_LOAD(k, group) - px, px - OV_WIDE_LOAD(k, group + 3 * OV_GROUP)), zero);
-        const ov_wide y = max(
-            max(OV_WIDE_LOAD(k, group + OV_GROUP) - py, py - OV_WIDE_LOAD(k, group + 4 * OV_GROUP)),
-            zero);
-        const ov_wide z = max(max(OV_WIDE_LOAD(k, group + 2 * OV_GROUP) - pz,
-                                  pz - OV_WIDE_LOAD(k, group + 5 * OV_GROUP)),
-                              zero);
-        OV_WIDE_STORE(fma(x, x, fma(y, y, z * z)), k, distance);
+        ov_wide farthest = ov_box_distance(from->x[0], from->y[0], from->z[0], group, k);
+        for (uint i = 1; i < points; ++i)
+            farthest = max(farthest, ov_box_distance(from->x[i], from->y[i], from->z[i], group, k));
+        OV_WIDE_STORE(farthest, k, distance);
     }
 }
 
 /* Squared distance to the nearest triangle of the leaves from first to end if that is below
- * `bound`, else bound; to any triangle once that is at most `enough`. triangles: of these leaves.
- * *leaf becomes the one that the triangle is in. */
-static inline float ov_nearest(float px, float py, float pz, float bound, float enough, int levels,
-                               const uint *first_group, __global const float *boxes, uint first,
-                               uint end, __global const float *triangles, uint *leaf) {
+ * `bound`, else bound; to any triangle once that is at most `enough`. Of several points that of the
+ * farthest counts. triangles: of these leaves. *leaf becomes the one that the triangle is in. */
+static inline float ov_nearest(const ov_from *from, const uint points, float bound, float enough,
+                               int levels, const uint *first_group, __global const float *boxes,
+                               uint first, uint end, __global const float *triangles, uint *leaf) {
     float distance[OV_LEVELS * OV_GROUP];      /* of the boxes of each level's current group */
     uint pending[OV_LEVELS], group[OV_LEVELS]; /* a bit for each of them still to be visited */
     int level = levels - 1;
@@ -212,15 +249,15 @@ static inline float ov_nearest(float px, float py, float pz, float bound, float 
         float *const own = distance + level * OV_GROUP;
         if (fresh) {
             const size_t g = first_group[level] + group[level];
-            ov_box_distances(px, py, pz, boxes + g * (6 * OV_GROUP), own);
+            ov_box_distances(from, points, boxes + g * (6 * OV_GROUP), own);
             uint bits = 0;
             for (uint j = 0; j < OV_GROUP; ++j)
                 bits |= own[j] < bound ? 1u << j : 0u;
             /* Of them, those of this level that hold some of the leaves. */
             const uint low = first >> (OV_GROUP_BITS * level),
-                       high = (end - 1) >> (OV_GROUP_BITS * level), from = group[level] * OV_GROUP;
-            bits &= ~0u << (low > from ? low - from : 0u);
-            bits &= (2u << min(high - from, OV_GROUP - 1u)) - 1u;
+                       high = (end - 1) >> (OV_GROUP_BITS * level), start = group[level] * OV_GROUP;
+            bits &= ~0u << (low > start ? low - start : 0u);
+            bits &= (2u << min(high - start, OV_GROUP - 1u)) - 1u;
             pending[level] = bits;
         }
         float least = bound;
@@ -241,7 +278,7 @@ static inline float ov_nearest(float px, float py, float pz, float bound, float 
         const uint child = group[level] * OV_GROUP + nearest;
         if (level == 0) {
             const float found = ov_leaf_distance(
-                px, py, pz, triangles + (size_t)(child - first) * (OV_TRIANGLE * OV_LEAF));
+                from, points, triangles + (size_t)(child - first) * (OV_TRIANGLE * OV_LEAF));
             *leaf = found < bound ? child : *leaf;
             bound = min(bound, found);
         } else {
@@ -276,8 +313,8 @@ __kernel void distances(const uint count, const uint each, const uint from,
     const size_t first = get_global_id(0) * (size_t)each;
     uint leaf = end_leaf; /* none */
     for (size_t k = first; k < min(first + each, (size_t)count); ++k) {
-        __global const float *const point = xyz + 3 * (from + k);
-        const float x = point[0], y = point[1], z = point[2];
+        const ov_from point = ov_from_load(xyz + 3 * (from + k), 1);
+        const float x = point.x[0], y = point.y[0], z = point.z[0];
         float bound = use_bound ? squared[to + k] : INFINITY;
         const float bx = max(max(low.x - x, x - high.x), 0.0f),
                     by = max(max(low.y - y, y - high.y), 0.0f),
@@ -293,8 +330,30 @@ __kernel void distances(const uint count, const uint each, const uint from,
             bound = min(bound, found);
         }
         if (bound > enough)
-            bound = ov_nearest(x, y, z, bound, enough, levels, first_group, boxes, first_leaf,
+            bound = ov_nearest(&point, 1, bound, enough, levels, first_group, boxes, first_leaf,
                                end_leaf, triangles, &leaf);
         squared[to + k] = bound;
     }
+}
+
+/* How far other triangles reach from these ones: squared[k] becomes the least over the triangles t
+ * of the leaves of the largest squared distance of the three corners of triangle k, which are at
+ * xyz[9 * k], from t, or stays what it was if that is less. The distance from t is a convex
+ * function, largest at a corner, so that no point of triangle k is farther than this from t. */
+__kernel void triangle_distances(const uint count, __global const float *restrict xyz,
+                                 const ov_tree tree, __global const float *restrict boxes,
+                                 const uint first_leaf, const uint end_leaf,
+                                 __global const float *restrict triangles,
+                                 __global float *restrict squared) {
+    const size_t k = get_global_id(0);
+    const int levels = (int)tree.levels;
+    uint first_group[OV_LEVELS];
+    for (uint l = 0; l < OV_LEVELS; ++l)
+        first_group[l] = tree.groups[l];
+    if (k >= count)
+        return;
+    const ov_from corners = ov_from_load(xyz + 9 * k, 3);
+    uint leaf = end_leaf;
+    squared[k] = ov_nearest(&corners, 3, squared[k], 0.0f, levels, first_group, boxes, first_leaf,
+                            end_leaf, triangles, &leaf);
 }

@@ -13,23 +13,21 @@
  *
  * On CPUs one work-item per term: w e^2 is computed for a tile of packs first, then the sums of
  * degree 0 to 2, 3 and 4 in a loop each, since all 35 need more registers than there are. On GPUs a
- * team of OV_TEAM work-items per term takes several packs at a time, and a tile is one point per
- * work-item.
+ * team of OV_TEAM work-items per term takes several packs at a time, and all sums go in one loop.
  */
 
 #if OV_LANES == 1
 #define OV_SHARERS 1 /* work-items per term */
 #define OV_TEAM_KERNEL __kernel
 #define OV_TILE_PACKS (64 / OV_VECTORS)
+#define OV_TILE (OV_TILE_PACKS * OV_VECTORS)
 #define OV_FLUSH_TILES 4
 #else
 #define OV_SHARERS OV_TEAM
 #define OV_TEAM_KERNEL __kernel __attribute__((reqd_work_group_size(OV_TEAM, 1, 1)))
-#define OV_TILE_PACKS OV_PACKS_AT_ONCE
-#define OV_FLUSH_TILES 32
+#define OV_TILE_PACKS (OV_SHARERS / OV_LANES)
+#define OV_FLUSH_TILES (32 / OV_VECTORS)
 #endif
-#define OV_PACKS_AT_ONCE (OV_SHARERS / OV_LANES)
-#define OV_TILE (OV_TILE_PACKS / OV_PACKS_AT_ONCE * OV_VECTORS)
 
 /* Degrees 0 to 2, 3 and 4: where their sums start. */
 #define OV_CUBIC 10
@@ -102,22 +100,21 @@ static inline void ov_add_quartic(ov_vec *sum, ov_vec e, const ov_offset o) {
     sum[14] = fma(ezz, zz, sum[14]);
 }
 
+#if OV_SHARERS == 1
 /* One pass over the tile for `sums` of the sums, kept in registers: from zero, then added to
  * sum[first] .. */
 #define OV_PASS(add, first, sums)                                                                  \
     {                                                                                              \
         ov_vec part[sums];                                                                         \
         _Pragma("unroll") for (uint m = 0; m < (sums); ++m) part[m] = 0.0f;                        \
-        for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n) {           \
+        for (uint k = 0; k < packs; ++k) {                                                         \
             const size_t pack = item[begin + k];                                                   \
-            _Pragma("unroll") for (uint v = 0; v < OV_VECTORS; ++v) {                              \
-                const uint at = v * OV_LANES + lane;                                               \
-                add(part, tile[n * OV_VECTORS + v],                                                \
-                    ov_offset_of(points, pack, at, centre + 4 * n));                               \
-            }                                                                                      \
+            _Pragma("unroll") for (uint v = 0; v < OV_VECTORS; ++v) add(                           \
+                part, tile[k * OV_VECTORS + v], ov_offset_of(points, pack, v, centre + 4 * k));    \
         }                                                                                          \
         _Pragma("unroll") for (uint m = 0; m < (sums); ++m) sum[(first) + m] += part[m];           \
     }
+#endif
 
 /* Sum of a vector, halves first. */
 static inline float ov_sum(ov_vec value) {
@@ -137,13 +134,81 @@ static inline float ov_sum(ov_vec value) {
 #endif
 }
 
+#if OV_SHARERS > 1
+/* Monomials that a team adds up at a time: local memory for all would be too much. */
+#define OV_AT_A_TIME (OV_GRAM / 2 + 1)
+
+/* Sum over a team, in blocks: shorter chains, so fewer roundings. */
+static inline float ov_sum_team(__local const float *parts) {
+#if OV_SHARERS >= 16
+    float4 four = 0.0f;
+    for (uint s = 0; s < OV_SHARERS; s += 16)
+        four += (vload4(0, parts + s) + vload4(1, parts + s)) +
+                (vload4(2, parts + s) + vload4(3, parts + s));
+    return (four.x + four.y) + (four.z + four.w);
+#else
+    float sum = 0.0f;
+    for (uint s = 0; s < OV_SHARERS; ++s)
+        sum += parts[s];
+    return sum;
+#endif
+}
+#endif
+
+/* Adds the packs item[begin] .. item[end - 1], at most OV_TILE_PACKS, to the sums. */
+#if OV_SHARERS > 1
+static inline void ov_add_tile_gram(ov_vec *sum, const ov_term t, __global const ov_term *own,
+                                    __global const float *points, __global const float4 *origins,
+                                    __global const float *weight, __global const uint *item,
+                                    const uint begin, const uint end, const uint sharer) {
+    const uint k = begin + sharer / OV_LANES, lane = sharer % OV_LANES;
+    if (k >= end)
+        return;
+    const size_t pack = item[k];
+    float centre[4];
+    vstore4(ov_centre(own, origins[pack]), 0, centre);
+#pragma unroll
+    for (uint v = 0; v < OV_VECTORS; ++v) {
+        const uint at = v * OV_LANES + lane;
+        const ov_offset o = ov_offset_of(points, pack, at, centre);
+        const ov_vec e = ov_value(t, o.x, o.y, o.z);
+        const ov_vec we = OV_LOAD(at, weight + pack * OV_PACK) * e * e;
+        ov_add_quadratic(sum, we, o);
+        ov_add_cubic(sum + OV_CUBIC, we, o);
+        ov_add_quartic(sum + OV_QUARTIC, we, o);
+    }
+}
+#else
+static inline void ov_add_tile_gram(ov_vec *sum, const ov_term t, __global const ov_term *own,
+                                    __global const float *points, __global const float4 *origins,
+                                    __global const float *weight, __global const uint *item,
+                                    const uint begin, const uint end, const uint sharer) {
+    const uint packs = end - begin;
+    ov_vec tile[OV_TILE];
+    float centre[4 * OV_TILE_PACKS];
+    for (uint k = 0; k < packs; ++k)
+        vstore4(ov_centre(own, origins[item[begin + k]]), k, centre);
+    for (uint k = 0; k < packs; ++k) {
+        const size_t pack = item[begin + k];
+#pragma unroll
+        for (uint v = 0; v < OV_VECTORS; ++v) {
+            const ov_offset o = ov_offset_of(points, pack, v, centre + 4 * k);
+            const ov_vec e = ov_value(t, o.x, o.y, o.z);
+            tile[k * OV_VECTORS + v] = OV_LOAD(v, weight + pack * OV_PACK) * e * e;
+        }
+    }
+    OV_PASS(ov_add_quadratic, 0, OV_CUBIC)
+    OV_PASS(ov_add_cubic, OV_CUBIC, OV_QUARTIC - OV_CUBIC)
+    OV_PASS(ov_add_quartic, OV_QUARTIC, OV_GRAM - OV_QUARTIC)
+}
+#endif
+
 OV_TEAM_KERNEL void gram(const uint count, __global const float *restrict points,
                          __global const float4 *restrict origins,
                          __global const float *restrict weight, __global const uint *restrict start,
                          __global const uint *restrict item, __global const ov_term *restrict terms,
                          __global float *restrict result) {
     const uint index = get_global_id(0) / OV_SHARERS, sharer = get_global_id(0) % OV_SHARERS;
-    const uint lane = sharer % OV_LANES;
 #if OV_SHARERS == 1
     if (index >= count)
         return;
@@ -163,24 +228,8 @@ OV_TEAM_KERNEL void gram(const uint count, __global const float *restrict points
         for (uint m = 0; m < OV_GRAM; ++m)
             sum[m] = 0.0f;
         for (uint begin = first; begin < stop; begin += OV_TILE_PACKS) {
-            const uint packs = min((uint)OV_TILE_PACKS, stop - begin);
-            ov_vec tile[OV_TILE];
-            float centre[4 * OV_TILE_PACKS / OV_PACKS_AT_ONCE];
-            for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n)
-                vstore4(ov_centre(terms + index, origins[item[begin + k]]), n, centre);
-            for (uint k = sharer / OV_LANES, n = 0; k < packs; k += OV_PACKS_AT_ONCE, ++n) {
-                const size_t pack = item[begin + k];
-#pragma unroll
-                for (uint v = 0; v < OV_VECTORS; ++v) {
-                    const uint at = v * OV_LANES + lane;
-                    const ov_offset o = ov_offset_of(points, pack, at, centre + 4 * n);
-                    const ov_vec e = ov_value(t, o.x, o.y, o.z);
-                    tile[n * OV_VECTORS + v] = OV_LOAD(at, weight + pack * OV_PACK) * e * e;
-                }
-            }
-            OV_PASS(ov_add_quadratic, 0, OV_CUBIC)
-            OV_PASS(ov_add_cubic, OV_CUBIC, OV_QUARTIC - OV_CUBIC)
-            OV_PASS(ov_add_quartic, OV_QUARTIC, OV_GRAM - OV_QUARTIC)
+            ov_add_tile_gram(sum, t, terms + index, points, origins, weight, item, begin,
+                             begin + min((uint)OV_TILE_PACKS, stop - begin), sharer);
         }
 #pragma unroll
         for (uint m = 0; m < OV_GRAM; ++m)
@@ -194,21 +243,18 @@ OV_TEAM_KERNEL void gram(const uint count, __global const float *restrict points
         out[m] = ov_sum(total[m] + rest[m]);
 #else
     /* One work-item adds up the team's sums of one monomial, in order. */
-    __local float scratch[OV_GRAM * (OV_SHARERS + 1)];
+    __local float scratch[OV_AT_A_TIME * (OV_SHARERS + 1)];
 #pragma unroll
-    for (uint m = 0; m < OV_GRAM; ++m)
-        scratch[m * (OV_SHARERS + 1) + sharer] = ov_sum(total[m] + rest[m]);
-    barrier(CLK_LOCAL_MEM_FENCE);
-    for (uint m = sharer; m < OV_GRAM; m += OV_SHARERS) {
-        __local const float *const parts = scratch + m * (OV_SHARERS + 1);
-#if OV_SHARERS >= 4
-        float4 four = 0.0f; /* shorter chains, so fewer roundings */
-        for (uint s = 0; s < OV_SHARERS; s += 4)
-            four += vload4(0, parts + s);
-        out[m] = (four.x + four.y) + (four.z + four.w);
-#else
-        out[m] = parts[0] + parts[1];
-#endif
+    for (uint first = 0; first < OV_GRAM; first += OV_AT_A_TIME) {
+        const uint last = min((uint)OV_GRAM, first + OV_AT_A_TIME);
+        barrier(CLK_LOCAL_MEM_FENCE);
+#pragma unroll
+        for (uint m = 0; m < OV_GRAM; ++m)
+            if (m >= first && m < last)
+                scratch[(m - first) * (OV_SHARERS + 1) + sharer] = ov_sum(total[m] + rest[m]);
+        barrier(CLK_LOCAL_MEM_FENCE);
+        for (uint m = first + sharer; m < last; m += OV_SHARERS)
+            out[m] = ov_sum_team(scratch + (m - first) * (OV_SHARERS + 1));
     }
 #endif
 }
@@ -216,3 +262,4 @@ OV_TEAM_KERNEL void gram(const uint count, __global const float *restrict points
 /* Other files have their own. */
 #undef OV_TILE_PACKS
 #undef OV_FLUSH_TILES
+#undef OV_TILE

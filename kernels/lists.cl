@@ -5,7 +5,8 @@
  * `skin` on every side. The test is tight: it minimises the convex q over the box by coordinate
  * descent, and its lower bound q + min over the box of grad q . (z' - z) never loses a pair.
  *
- * Each term walks once down a tree of boxes over the packs. What it finds is kept as entries, one
+ * Each term walks once down a tree of boxes over the packs, as one work-item or as a team. What it
+ * finds is kept as entries, one
  * for each group of OV_GROUP packs with a bit for each of them: both lists are made of these, which
  * are several times fewer than pairs. Entries go to chunks taken as they are needed, since nobody
  * knows beforehand how many a term has.
@@ -14,8 +15,20 @@
 #define OV_SWEEPS 3
 #define OV_GROUP_VECTORS (OV_GROUP / OV_TEST)
 
-/* Width of the box test: wide on CPUs, and on GPUs four boxes per work-item hide the latencies. */
-#if OV_VECTOR == 1
+/* Where a work-group is large enough, as on GPUs, a team shares the walk of a term and all that
+ * follows; elsewhere a work-item does it alone. */
+#define OV_BY_TEAM (OV_LANES > 1 && OV_TEAM >= OV_GROUP)
+#if OV_BY_TEAM
+#define OV_LIST_KERNEL __kernel __attribute__((reqd_work_group_size(OV_TEAM, 1, 1)))
+#else
+#define OV_LIST_KERNEL __kernel
+#endif
+
+/* Width of the box test: wide on CPUs, one box per work-item of a team. Single work-items without
+ * vectors take four boxes, which hides the latencies. */
+#if OV_BY_TEAM
+#define OV_TEST 1
+#elif OV_VECTOR == 1
 #define OV_TEST 4
 #else
 #define OV_TEST OV_VECTOR
@@ -27,6 +40,10 @@
 #else
 #define OV_SIDES 1
 #endif
+#if OV_TEST == 1
+typedef float ov_test;
+#define OV_TEST_LOAD(index, pointer) ((pointer)[index])
+#else
 typedef OV_JOIN(float, OV_TEST) ov_test;
 typedef OV_JOIN(int, OV_TEST) ov_test_hit;
 #define OV_TEST_LOAD OV_JOIN(vload, OV_TEST)
@@ -48,6 +65,7 @@ static inline uint ov_bits(ov_test_hit hit) {
     const int2 two = four.lo | four.hi;
     return (uint)(two.x | two.y);
 }
+#endif
 
 /* As clamp(), which compilers make longer for the sake of values that are not finite. */
 static inline ov_test ov_within(ov_test x, ov_test low, ov_test high) {
@@ -102,9 +120,198 @@ static inline ov_test ov_lower_bound(const ov_term t, const ov_boxes b) {
 
 /* A bit for each box that the term may reach. */
 static inline uint ov_reached(const ov_term t, const ov_boxes b, ov_test least) {
+#if OV_TEST == 1
+    return least <= t.reach && b.lx <= b.hx;
+#else
     return ov_bits((least <= t.reach) & (b.lx <= b.hx));
+#endif
 }
 
+/* The lowest bit that is set. */
+static inline uint ov_lowest(uint bits) {
+    return 31 - clz(bits & -bits);
+}
+
+/* Bin of the entries of a group: terms that follow one another share it (see shared.h). */
+static inline uint ov_bin(uint group, uint term, uint block) {
+    return group * OV_BINS + term / block;
+}
+
+#if OV_BY_TEAM
+/* What the values of the team's work-items before this one come to, and in .y those of all. */
+static inline uint2 ov_sum_before(const uint value, const uint sharer, __local uint *scratch) {
+    scratch[sharer] = value;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (uint width = 1; width < OV_TEAM; width *= 2) {
+        const uint more = sharer >= width ? scratch[sharer - width] : 0;
+        barrier(CLK_LOCAL_MEM_FENCE);
+        scratch[sharer] += more;
+        barrier(CLK_LOCAL_MEM_FENCE);
+    }
+    const uint2 sums = (uint2)(scratch[sharer] - value, scratch[OV_TEAM - 1]);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    return sums;
+}
+#endif
+
+#if OV_BY_TEAM
+/* Groups that a team tests side by side, and how many they may hand on to the level below. */
+#define OV_ABREAST (OV_TEAM / OV_GROUP)
+#define OV_HANDED (OV_ABREAST * OV_GROUP)
+#if OV_ABREAST > OV_CHUNK
+#error "entries of groups side by side would need more than one new chunk"
+#endif
+
+/* What a team shares: the groups of each level that are still to be tested, a bit for each box that
+ * was reached in those under test, and the last chunk taken. */
+typedef struct ov_walk {
+    uint group[OV_LEVELS][OV_HANDED];
+    uint bits[OV_ABREAST];
+    uint chunk;
+} ov_walk;
+
+/* A lower bound of q over the box. */
+static inline ov_test ov_least_q(const ov_term t, const ov_boxes b) {
+    if (t.xy == 0.0f && t.xz == 0.0f && t.yz == 0.0f)
+        return ov_least_aligned(t, b);
+    return ov_lower_bound(t, b);
+}
+
+/* Makes walk->bits for `count` groups of boxes, one box per work-item. */
+static inline void ov_test_boxes(const ov_term t, __global const float *boxes,
+                                 __local const uint *group, const uint count, const float skin,
+                                 const uint sharer, __local ov_walk *walk) {
+    if (sharer < count)
+        walk->bits[sharer] = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    const uint own = sharer / OV_GROUP, j = sharer % OV_GROUP;
+    if (own < count) {
+        const ov_boxes b = ov_load_boxes(t, boxes + (size_t)group[own] * (6 * OV_GROUP), j, skin);
+        if (ov_reached(t, b, ov_least_q(t, b)))
+            atomic_or(&walk->bits[own], 1u << j);
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+}
+
+/* Counts what was reached in `count` groups side by side: by whole groups, or by single boxes. */
+typedef struct ov_reach {
+    uint before; /* reached groups before that of the work-item */
+    uint groups;
+    uint boxes_before; /* reached boxes before that of the work-item */
+    uint boxes;
+} ov_reach;
+
+static inline ov_reach ov_count_reached(const uint count, const uint sharer,
+                                        __local const ov_walk *walk) {
+    const uint own = sharer / OV_GROUP, j = sharer % OV_GROUP;
+    ov_reach reach = {0, 0, 0, 0};
+    for (uint k = 0; k < count; ++k) {
+        const uint bits = walk->bits[k], boxes = popcount(bits);
+        reach.before += k < sharer && bits != 0;
+        reach.groups += bits != 0;
+        reach.boxes_before += k < own ? boxes : 0;
+        reach.boxes += boxes;
+    }
+    if (own < count)
+        reach.boxes_before += popcount(walk->bits[own] & ((1u << j) - 1u));
+    return reach;
+}
+
+/* Keeps an entry, if there is room for its chunk. */
+static inline void ov_enter(const uint entry, const uint chunk, const uint group, const uint bits,
+                            const uint room, __global uint *entry_group,
+                            __global ushort *entry_bits) {
+    const size_t at = (size_t)chunk * OV_CHUNK + entry % OV_CHUNK;
+    if (chunk < room) {
+        entry_group[at] = group;
+        entry_bits[at] = (ushort)bits;
+    }
+}
+
+/* The entries of every term, in ascending order of their groups: entry k of a term is at
+ * k % OV_CHUNK of its chunk k / OV_CHUNK, of which chain[term] holds the first one, next[chunk] the
+ * one after, and chain[term].y the number of entries. Chunks from `room` on are counted, not
+ * written.
+ *
+ * tally, zero at the start: chunks taken, entries of every bin, pairs of every group, pairs of
+ * every term. block: terms that share a bin. groups: of packs, 0 where nobody wants their lists,
+ * and bins and groups are not counted. */
+OV_LIST_KERNEL void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
+                                   const ov_tree tree, __global const float *restrict boxes,
+                                   const float skin, const uint groups, const uint block,
+                                   const uint room, __global uint *restrict tally,
+                                   __global uint2 *restrict chain, __global uint *restrict next,
+                                   __global uint *restrict entry_group,
+                                   __global ushort *restrict entry_bits) {
+    __local ov_walk walk;
+    const uint index = get_group_id(0), sharer = get_local_id(0);
+    const int levels = (int)tree.levels;
+    __global uint *const bins = tally + 1;
+    __global uint *const pairs = bins + (size_t)groups * OV_BINS;
+    const ov_term t = terms[index];
+    uint found = 0, entries = 0, first = 0, chunk = 0;
+    /* Depth first, some groups of one level at a time: of those held at a level, so many are taken.
+     * Every work-item keeps the same count, and meets the same barriers. */
+    uint held[OV_LEVELS], taken[OV_LEVELS], first_group[OV_LEVELS];
+    for (uint l = 0; l < OV_LEVELS; ++l) {
+        held[l] = taken[l] = 0;
+        first_group[l] = tree.groups[l];
+    }
+    int level = t.reach >= 0.0f && levels > 0 ? levels - 1 : levels;
+    if (level < levels)
+        held[level] = 1;
+    if (sharer == 0)
+        walk.group[max(levels - 1, 0)][0] = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    while (level < levels) {
+        __local const uint *const group = walk.group[level] + taken[level];
+        const uint count = min(held[level] - taken[level], (uint)OV_ABREAST);
+        ov_test_boxes(t, boxes + (size_t)first_group[level] * (6 * OV_GROUP), group, count,
+                      skin + t.skin, sharer, &walk);
+        const ov_reach reach = ov_count_reached(count, sharer, &walk);
+        taken[level] += count;
+        /* The first entry that begins a chunk, if any of these does. */
+        const uint begins = (entries + OV_CHUNK - 1) / OV_CHUNK * OV_CHUNK;
+        const bool more = level == 0 && begins < entries + reach.groups;
+        if (more && sharer == 0) {
+            walk.chunk = atomic_inc(tally);
+            if (begins > 0 && chunk < room)
+                next[chunk] = walk.chunk;
+        }
+        barrier(CLK_LOCAL_MEM_FENCE);
+        if (level == 0) {
+            if (sharer < count && walk.bits[sharer] != 0) {
+                const uint entry = entries + reach.before;
+                const uint into = more && entry >= begins ? walk.chunk : chunk;
+                ov_enter(entry, into, group[sharer], walk.bits[sharer], room, entry_group,
+                         entry_bits);
+                if (groups > 0) {
+                    atomic_inc(&bins[ov_bin(group[sharer], index, block)]);
+                    atomic_add(&pairs[group[sharer]], popcount(walk.bits[sharer]));
+                }
+            }
+            first = more && begins == 0 ? walk.chunk : first;
+            chunk = more ? walk.chunk : chunk;
+            entries += reach.groups;
+            found += reach.boxes;
+        } else {
+            const uint own = sharer / OV_GROUP, j = sharer % OV_GROUP;
+            if (own < count && (walk.bits[own] >> j & 1u))
+                walk.group[level - 1][reach.boxes_before] = group[own] * OV_GROUP + j;
+            held[level - 1] = reach.boxes;
+            taken[level - 1] = 0;
+            --level;
+        }
+        while (level < levels && taken[level] == held[level])
+            ++level;
+        barrier(CLK_LOCAL_MEM_FENCE); /* all have read the bits, and what is handed on is there */
+    }
+    if (sharer == 0) {
+        pairs[groups + index] = found;
+        chain[index] = (uint2)(first, entries);
+    }
+}
+#else
 /* Tests the term against the boxes of OV_SIDES groups, whose bits follow one another: bit j of a
  * group is set where its box j may be reached. */
 static inline uint ov_test_groups(const ov_term t, __global const float *one,
@@ -138,24 +345,6 @@ static inline uint ov_test_groups(const ov_term t, __global const float *one,
 #endif
 }
 
-/* The lowest bit that is set. */
-static inline uint ov_lowest(uint bits) {
-    return 31 - clz(bits & -bits);
-}
-
-/* Bin of the entries of a group: terms that follow one another share it (see shared.h). */
-static inline uint ov_bin(uint group, uint term, uint block) {
-    return group * OV_BINS + term / block;
-}
-
-/* The entries of every term, in ascending order of their groups: entry k of a term is at
- * k % OV_CHUNK of its chunk k / OV_CHUNK, of which chain[term] holds the first one, next[chunk] the
- * one after, and chain[term].y the number of entries. Chunks from `room` on are counted, not
- * written.
- *
- * tally, zero at the start: chunks taken, entries of every bin, pairs of every group, pairs of
- * every term. block: terms that share a bin. groups: of packs, 0 where nobody wants their lists,
- * and bins and groups are not counted. */
 __kernel void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
                              const ov_tree tree, __global const float *restrict boxes,
                              const float skin, const uint groups, const uint block, const uint room,
@@ -246,6 +435,8 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
     chain[index] = (uint2)(first, entries);
 }
 
+#endif
+
 /* The stretch of `count` numbers that a work-item of the only work-group takes: first and end. */
 static inline uint2 own_stretch(const uint count) {
     const uint size = get_local_size(0), each = (count + size - 1) / size;
@@ -323,6 +514,43 @@ __kernel void scan_lists(const uint terms_count, const uint groups, const uint4 
  * group_term, group_bits: the entries of each group of packs; place holds where each bin begins,
  * and afterwards ends, and the order within a bin depends on timing. start or place may be null:
  * nobody wants these lists. */
+#if OV_BY_TEAM
+OV_LIST_KERNEL void
+hand_out_entries(const uint terms_count, const uint block, __global const uint2 *restrict chain,
+                 __global const uint *restrict next, __global const uint *restrict entry_group,
+                 __global const ushort *restrict entry_bits, __global const uint *restrict start,
+                 __global uint *restrict item, __global uint *restrict place,
+                 __global uint *restrict group_term, __global ushort *restrict group_bits,
+                 __global const uint *restrict totals) {
+    __local uint scratch[OV_TEAM];
+    const uint index = get_group_id(0), sharer = get_local_id(0);
+    const uint entries = totals[4] != 0 ? chain[index].y : 0; /* all meet the barriers */
+    uint chunk = chain[index].x, reached = 0; /* the latter counts chunks along the chain */
+    uint to = start ? start[index] : 0;
+    for (uint first = 0; first < entries; first += OV_TEAM) {
+        const uint entry = first + sharer;
+        uint group = 0, bits = 0;
+        if (entry < entries) {
+            for (; reached < entry / OV_CHUNK; ++reached)
+                chunk = next[chunk];
+            const size_t at = (size_t)chunk * OV_CHUNK + entry % OV_CHUNK;
+            group = entry_group[at];
+            bits = entry_bits[at];
+        }
+        if (place && bits != 0) {
+            const uint own = atomic_inc(&place[ov_bin(group, index, block)]);
+            group_term[own] = index;
+            group_bits[own] = (ushort)bits;
+        }
+        if (start) {
+            const uint2 packs = ov_sum_before(popcount(bits), sharer, scratch);
+            for (uint own = to + packs.x; bits != 0; bits &= bits - 1)
+                item[own++] = group * OV_GROUP + ov_lowest(bits);
+            to += packs.y;
+        }
+    }
+}
+#else
 __kernel void
 hand_out_entries(const uint terms_count, const uint block, __global const uint2 *restrict chain,
                  __global const uint *restrict next, __global const uint *restrict entry_group,
@@ -351,12 +579,97 @@ hand_out_entries(const uint terms_count, const uint block, __global const uint2 
                 item[to++] = group * OV_GROUP + ov_lowest(bits);
     }
 }
+#endif
 
-/* The terms of every pack in ascending order, so that sums have one order: a work-item sorts the
- * entries of its group, and makes the lists of its packs from them. Insertion sort: only entries of
- * the same bin can be in disorder, and few are.
+/* Insertion sort: puts entry k where it belongs among those from `first` on, which are in order;
+ * its bits. Only entries of the same bin can be in disorder, and few are. */
+static inline ushort ov_sort_in(const uint first, const uint k, __global uint *group_term,
+                                __global ushort *group_bits) {
+    const uint term = group_term[k];
+    const ushort bits = group_bits[k];
+    uint hole = k;
+    for (; hole > first && group_term[hole - 1] > term; --hole) {
+        group_term[hole] = group_term[hole - 1];
+        group_bits[hole] = group_bits[hole - 1];
+    }
+    if (hole != k) {
+        group_term[hole] = term;
+        group_bits[hole] = bits;
+    }
+    return bits;
+}
+
+#if OV_BY_TEAM
+/* Entries that a team sorts at once, in local memory. */
+#define OV_SORTED 512
+
+/* Puts the entries from `first` to `end` in order: each goes behind all that are smaller. Where
+ * there are too many for that, one work-item sorts them. */
+static inline void ov_sort(const uint first, const uint end, const uint sharer, __local uint *term,
+                           __local ushort *bits, __global uint *group_term,
+                           __global ushort *group_bits) {
+    const uint count = end - first;
+    const bool few = count <= OV_SORTED;
+    for (uint k = sharer; few && k < count; k += OV_TEAM) {
+        term[k] = group_term[first + k];
+        bits[k] = group_bits[first + k];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE); /* all are read */
+    for (uint k = sharer; few && k < count; k += OV_TEAM) {
+        uint before = 0;
+        for (uint i = 0; i < count; ++i)
+            before += term[i] < term[k];
+        group_term[first + before] = term[k];
+        group_bits[first + before] = bits[k];
+    }
+    for (uint k = first; !few && sharer == 0 && k < end; ++k)
+        ov_sort_in(first, k, group_term, group_bits);
+    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+}
+#endif
+
+/* The terms of every pack in ascending order, so that sums have one order: the entries of a group
+ * are sorted, and the lists of its packs made from them.
  *
  * place: where the entries of each bin end, then where the pairs of each group begin. */
+#if OV_BY_TEAM
+OV_LIST_KERNEL void lists_of_packs(const uint groups, const uint packs,
+                                   __global const uint *restrict place, __global uint *group_term,
+                                   __global ushort *group_bits, __global uint *restrict start,
+                                   __global uint *restrict item) {
+    __local uint scratch[OV_TEAM], term[OV_SORTED];
+    __local ushort bits[OV_SORTED];
+    const uint group = get_group_id(0), sharer = get_local_id(0);
+    __global const uint *const bin_end = place, *const pair_start =
+                                                    place + (size_t)groups * OV_BINS;
+    const uint first = group == 0 ? 0 : bin_end[group * OV_BINS - 1];
+    const uint end = bin_end[group * OV_BINS + OV_BINS - 1];
+    /* All at once where they are few; else bin by bin, which are in order. */
+    const uint sorts = end - first <= OV_SORTED / 2 ? 1 : OV_BINS;
+    uint from_bin = first;
+    for (uint bin = 0; bin < sorts; ++bin) {
+        const uint to_bin = sorts == 1 ? end : bin_end[group * OV_BINS + bin];
+        ov_sort(from_bin, to_bin, sharer, term, bits, group_term, group_bits);
+        from_bin = to_bin;
+    }
+    /* Several work-items per pack, each with a stretch of the entries. */
+    const uint j = sharer / OV_ABREAST, share = sharer % OV_ABREAST;
+    const uint each = (end - first + OV_ABREAST - 1) / OV_ABREAST;
+    const uint from = min(first + share * each, end), stop = min(from + each, end);
+    uint count = 0;
+    for (uint k = from; k < stop; ++k)
+        count += group_bits[k] >> j & 1u;
+    const uint2 before = ov_sum_before(count, sharer, scratch);
+    uint to = pair_start[group] + before.x;
+    if (share == 0 && group * OV_GROUP + j < packs)
+        start[group * OV_GROUP + j] = to;
+    if (sharer == 0 && group == groups - 1)
+        start[packs] = to + before.y;
+    for (uint k = from; k < stop; ++k)
+        if (group_bits[k] >> j & 1u)
+            item[to++] = group_term[k];
+}
+#else
 __kernel void lists_of_packs(const uint groups, const uint packs,
                              __global const uint *restrict place, __global uint *group_term,
                              __global ushort *group_bits, __global uint *restrict start,
@@ -370,20 +683,8 @@ __kernel void lists_of_packs(const uint groups, const uint packs,
     const uint end = bin_end[group * OV_BINS + OV_BINS - 1];
     const uint16 lane = (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     uint16 counts = 0;
-    for (uint k = first; k < end; ++k) {
-        const uint term = group_term[k];
-        const ushort bits = group_bits[k];
-        uint hole = k;
-        for (; hole > first && group_term[hole - 1] > term; --hole) {
-            group_term[hole] = group_term[hole - 1];
-            group_bits[hole] = group_bits[hole - 1];
-        }
-        if (hole != k) {
-            group_term[hole] = term;
-            group_bits[hole] = bits;
-        }
-        counts += (uint16)(bits) >> lane & 1u;
-    }
+    for (uint k = first; k < end; ++k)
+        counts += (uint16)(ov_sort_in(first, k, group_term, group_bits)) >> lane & 1u;
     uint cursor[OV_GROUP];
     vstore16(counts, 0, cursor);
     uint at = pair_start[group];
@@ -402,3 +703,4 @@ __kernel void lists_of_packs(const uint groups, const uint packs,
             item[cursor[ov_lowest(bits)]++] = term;
     }
 }
+#endif

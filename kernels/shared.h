@@ -39,7 +39,7 @@ typedef float ov_f32;
 #define OV_GRAM 35
 
 /* Work-items that make starts of counts, at most. */
-#define OV_SCAN_GROUP 64
+#define OV_SCAN_GROUP 256
 
 /* Packs that share a sum of the misfit (kernels/misfit.cl). */
 #define OV_MISFIT_PACKS 64

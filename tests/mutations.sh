@@ -19,6 +19,9 @@ mutations() {
     cat <<'LIST'
 host/measure/distance.c|distance|chunks half as far as the best are skipped|s/box_distance(box, m->box) > most/box_distance(box, m->box) > 0.25 * most/
 host/measure/distance.c|distance|chunks nearly as far as the best are skipped|s/box_distance(box, m->box) > most/box_distance(box, m->box) > 0.8 * most/
+host/measure/bound.c|bound|a triangle reaches no farther than its corners|s|return farthest + longest_edge(p->at) / sqrt(3.0);|return farthest;|
+host/measure/bound.c|+bound|what is left over is forgotten|s/b->bound->most = fmax(b->bound->most, b->now.fragment\[n\].most);/;/
+kernels/distance.cl|bound|the nearest corner counts|s/max(farthest, ov_triangle_distances/min(farthest, ov_triangle_distances/
 host/fit/l1/l1.c|l1|no evaluation after a failed search|s/failures > 0) .*$/false)/
 host/fit/l1/l1.c|l1|a trial that is no model ends the fit|s/if (status != OVOID_ERROR_NUMERIC)/if (true)/
 host/fit/l1/objective.c|l1_objective|lists count as whole while they are built|/objective->listed_count = 0;/d

@@ -468,6 +468,9 @@ static void lists_are_sorted_on_the_device(void **state) {
     ov_buffer places = {0}, group_terms = {0}, group_bits = {0}, start = {0}, item = {0};
     const cl_uint groups = GROUPS, packs = PACKS;
     uint32_t used = 0, expected = 0;
+    ov_device *device;
+    test_check(*state, ov_device_get(*state, &device));
+    const size_t team = device->team >= OV_GROUP ? device->team : 1;
     for (uint32_t g = 0; g < GROUPS; ++g) {
         const uint32_t length = g == 0 ? 0 : g == 1 ? 1 : LENGTH - g;
         place[GROUPS * OV_BINS + g] = expected;
@@ -497,7 +500,7 @@ static void lists_are_sorted_on_the_device(void **state) {
     test_check(*state, ov_buffer_reserve(*state, &start, (PACKS + 1) * sizeof *term, "starts"));
     test_check(*state, ov_buffer_reserve(*state, &item, expected * sizeof *term, "items"));
     test_check(*state,
-               OV_LAUNCH(*state, &lists, GROUPS, 1, OV_ARG(groups), OV_ARG(packs),
+               OV_LAUNCH(*state, &lists, GROUPS * team, team, OV_ARG(groups), OV_ARG(packs),
                          OV_ARG(places.memory), OV_ARG(group_terms.memory),
                          OV_ARG(group_bits.memory), OV_ARG(start.memory), OV_ARG(item.memory)));
     uint32_t *const starts = read_indices(*state, &start, PACKS + 1);

@@ -2,6 +2,7 @@
  * Measures of molecules and models: closed forms of one atom and one ellipsoid, what measures say
  * of surfaces with cavities, and the paper's Table 2.
  */
+#include "measure/bound.h"
 #include "measure/measure.h"
 #include "shapes.h"
 #include "support.h"
@@ -70,6 +71,8 @@ static void test_closed_forms(void **state) {
         const double far = fmax(axes[0] - radius, radius - axes[2]);
         expect_near(got.distances.hausdorff, far, test_small() ? 0.2 : 0.02, "hausdorff");
         expect_near(got.distances_outer.hausdorff, got.distances.hausdorff, 0.0, "outer");
+        expect_near(got.deviation_bound, far, test_small() ? 0.2 : 0.02, "bound");
+        assert_true(got.deviation_bound >= got.deviation);
         assert_true(got.distances.mean < got.distances.rms &&
                     got.distances.rms < got.distances.hausdorff);
         assert_int_equal(got.components_original, 1);
@@ -102,6 +105,7 @@ static void test_same_surface(void **state) {
     expect_near(got.area.error, 0.0, 1e-6, "area");
     expect_near(got.volume.error, 0.0, 1e-6, "volume");
     expect_near(got.distances.hausdorff, 0.0, 1e-4, "hausdorff");
+    expect_near(got.deviation_bound, 0.0, OV_BOUND_SLACK + 1e-4, "bound");
     assert_int_equal(got.components_original, 2);
     assert_int_equal(got.outer_sparse, 2);
     assert_true(got.seconds_mesh > 0.0 && got.seconds_distances > 0.0);
@@ -110,7 +114,8 @@ static void test_same_surface(void **state) {
     const double area = got.area.original;
     test_check(context, once_measure(context, molecule, model, &options, &got));
     expect_near(got.area.original, area, 0.0, "the area of a second run");
-    assert_true(isnan(got.distances.hausdorff) && isnan(got.deviation)); /* not asked for */
+    assert_true(isnan(got.distances.hausdorff) && isnan(got.deviation) &&
+                isnan(got.deviation_bound)); /* not asked for */
 
     options.vertices = OVOID_VERTEX_LINEAR; /* flat triangles of interpolated vertices: elsewhere */
     test_check(context, once_measure(context, molecule, model, &options, &got));
@@ -142,6 +147,7 @@ static void test_cavity(void **state) {
     expect_near(got.distances.hausdorff, 3.0, test_small() ? 0.2 : 0.02, "hausdorff");
     expect_near(got.distances.backward, 0.0, 1e-5, "backward");
     expect_near(got.distances_outer.hausdorff, 0.0, 1e-5, "outer hausdorff");
+    expect_near(got.deviation_bound, 0.0, 1e-4, "bound of outer surfaces");
     assert_int_equal(got.components_original, 2);
     assert_int_equal(got.outer_original, 1);
     assert_int_equal(got.components_sparse, 1);

@@ -70,8 +70,12 @@ void measures_print(FILE *stream, const ovoid_measures *measures,
                 measures->distances.hausdorff, measures->distances_outer.hausdorff,
                 measures->distances.mean, measures->distances_outer.mean);
     if (options->distances)
-        fprintf(stream, "deviation %.4g Å: largest of an outer surface from the other surface\n",
+        fprintf(stream, "deviation %.4g Å: largest of an outer surface from the other surface",
                 measures->deviation);
+    if (options->distances && isfinite(measures->deviation_bound))
+        fprintf(stream, "; anywhere on the meshes at most %.4g Å", measures->deviation_bound);
+    if (options->distances)
+        putc('\n', stream);
     fprintf(stream, "mesh      spacing %.9g Å, %s vertices\n", options->spacing,
             measures_vertices_name(options->vertices));
 }
@@ -126,7 +130,9 @@ bool measures_report(cJSON *object, const ovoid_measures *measures,
                     measures->components_sparse) ||
         !add_counts(object, "components_outer", measures->outer_original, measures->outer_sparse))
         return false;
-    if (options->distances && !cJSON_AddNumberToObject(object, "deviation", measures->deviation))
+    if (options->distances &&
+        (!cJSON_AddNumberToObject(object, "deviation", measures->deviation) ||
+         !cJSON_AddNumberToObject(object, "deviation_bound", measures->deviation_bound)))
         return false;
     if (options->distances &&
         !add_distances(object, &measures->distances, &measures->distances_outer))

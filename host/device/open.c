@@ -80,16 +80,21 @@ static size_t wave_of(const ov_device *device) {
     return 0;
 }
 
-/* Groups whose work-items share memory: a warp, or a wave of 64 where the device has those, or the
- * most that it runs. Powers of two. */
+/* Groups whose work-items share memory: the solver's are a warp, or a wave of 64 where the device
+ * has those; those that share a term are several, since few terms with long lists have to fill the
+ * device. Powers of two, and no more than the device runs. */
 #define WARP 32
 #define WAVE 64
-static void set_groups(ov_device *device) {
-    uint32_t group = wave_of(device) >= WAVE ? WAVE : WARP;
+#define TEAM 256
+static uint32_t group_of(const ov_device *device, uint32_t group) {
     while (group > 1 && group > device->max_group)
         group /= 2;
-    device->solve_group = group;
-    device->team = device->shape.lanes == 1 ? 1 : group; /* lanes fit into it: both are powers */
+    return group;
+}
+
+static void set_groups(ov_device *device) {
+    device->solve_group = group_of(device, wave_of(device) >= WAVE ? WAVE : WARP);
+    device->team = device->shape.lanes == 1 ? 1 : group_of(device, TEAM); /* lanes fit into it */
 }
 
 /* ---- opening and closing ------------------------------------------------------------------ */

@@ -72,15 +72,14 @@ static bool has_icd_end(const char *name) {
     return length > 4 && strcmp(name + length - 4, ".icd") == 0;
 }
 
-/* The folder, or the one file, where the loaders look (ocl-icd: OCL_ICD_VENDORS, Khronos's:
- * OCL_ICD_FILENAMES too). */
+/* The folder, or the one file, where the loaders look. */
 static bool find_icd(const char *library, char path[OV_PATH_SIZE]) {
-    const char *const wish = getenv("OCL_ICD_VENDORS"), *const one = getenv("OCL_ICD_FILENAMES");
+    const char *const wish = getenv("OCL_ICD_VENDORS");
     const char *const place = wish && *wish ? wish : "/etc/OpenCL/vendors";
-    bool found = one && strstr(one, library);
+    bool found = false;
     struct dirent *entry;
     DIR *const folder = opendir(place);
-    snprintf(path, OV_PATH_SIZE, "%s", found ? "OCL_ICD_FILENAMES" : place);
+    snprintf(path, OV_PATH_SIZE, "%s", place);
     while (folder && !found && (entry = readdir(folder))) {
         const int written = snprintf(path, OV_PATH_SIZE, "%s/%s", place, entry->d_name);
         found = written > 0 && written < OV_PATH_SIZE && has_icd_end(entry->d_name) &&
@@ -102,6 +101,12 @@ static bool has_platform(const ov_device_entry *entries, size_t count, const cha
     return false;
 }
 
+/* What the loader of Khronos reads as well, and ocl-icd 2.3.1 does not. */
+static bool is_in_filenames(const char *library) {
+    const char *const list = getenv("OCL_ICD_FILENAMES");
+    return list && strstr(list, library);
+}
+
 static void say(const driver *own, const char *library, char text[OV_VENDORS_TEXT]) {
     char icd[OV_PATH_SIZE];
     if (find_icd(own->library, icd))
@@ -113,11 +118,16 @@ static void say(const driver *own, const char *library, char text[OV_VENDORS_TEX
                      ? "is there, so its kernel module may not fit the library"
                      : "is missing, by which it reaches one (in a container: let the GPU in)");
     else
-        snprintf(text, OV_VENDORS_TEXT,
-                 "%s's OpenCL driver is installed, but no vendors file names it, so that it is not "
-                 "found: write the line %.400s into the file /etc/OpenCL/vendors/%s, or into a "
-                 "file of that name in a folder of your own and set OCL_ICD_VENDORS to that folder",
-                 own->vendor, library, own->icd);
+        snprintf(
+            text, OV_VENDORS_TEXT,
+            "%s's OpenCL driver is installed, but no vendors file names it%s, so that it is not "
+            "found: write the line %.400s into the file /etc/OpenCL/vendors/%s, or into a "
+            "file of that name in a folder of your own and set OCL_ICD_VENDORS to that folder",
+            own->vendor,
+            is_in_filenames(own->library)
+                ? " (OCL_ICD_FILENAMES does, which not every loader reads)"
+                : "",
+            library, own->icd);
 }
 
 bool ov_vendors_hint(const ov_device_entry *entries, size_t count, char text[OV_VENDORS_TEXT]) {

@@ -14,6 +14,7 @@ typedef struct plan {
     cl_uint block;   /* terms that share a bin */
     size_t bins;     /* of all groups */
     size_t counters; /* chunks, bins, groups, terms */
+    size_t team;     /* work-items that share a term or a group of packs */
     size_t group;    /* work-items of a work-group, */
     size_t scan;     /* and of that which makes starts of counts */
 } plan;
@@ -25,7 +26,8 @@ static plan make_plan(const ov_device *device, const ov_lists *lists, const ov_p
     p.block = p.terms / OV_BINS + 1;
     p.bins = (size_t)p.groups * OV_BINS;
     p.counters = 1 + p.bins + p.groups + p.terms;
-    p.group = ov_item_group(device);
+    p.team = device->team >= OV_GROUP ? device->team : 1; /* OV_BY_TEAM in kernels/lists.cl */
+    p.group = p.team > 1 ? p.team : ov_item_group(device);
     p.scan = device->shape.lanes == 1 ? 1 : OV_SCAN_GROUP;
     return p;
 }
@@ -97,8 +99,8 @@ static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_point
     const cl_mem place = lists->terms_only ? NULL : lists->place.memory; /* null in the kernel */
     const cl_mem start = lists->packs_only ? NULL : lists->term_start.memory;
     OV_TRY(reserve_tally(context, lists, p));
-    OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, p->terms, p->group, OV_ARG(p->terms),
-                     OV_ARG(terms->device.memory), OV_ARG(points->tree),
+    OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, p->terms * p->team, p->group,
+                     OV_ARG(p->terms), OV_ARG(terms->device.memory), OV_ARG(points->tree),
                      OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(p->groups),
                      OV_ARG(p->block), OV_ARG(chunks), OV_ARG(lists->tally.memory),
                      OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
@@ -204,14 +206,14 @@ static ovoid_status make_lists(ovoid_context *context, ov_lists *lists, const pl
     const cl_mem place = packs ? lists->place.memory : NULL;
     const cl_mem group_term = packs ? lists->group_term.memory : NULL;
     const cl_mem group_bits = packs ? lists->group_bits.memory : NULL;
-    OV_TRY(OV_LAUNCH(context, &lists->hand_out_entries, p->terms, p->group, OV_ARG(p->terms),
-                     OV_ARG(p->block), OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
-                     OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory),
-                     OV_ARG(start), OV_ARG(item), OV_ARG(place), OV_ARG(group_term),
-                     OV_ARG(group_bits), OV_ARG(lists->totals.memory)));
+    OV_TRY(OV_LAUNCH(context, &lists->hand_out_entries, p->terms * p->team, p->group,
+                     OV_ARG(p->terms), OV_ARG(p->block), OV_ARG(lists->chain.memory),
+                     OV_ARG(lists->next.memory), OV_ARG(lists->entry_group.memory),
+                     OV_ARG(lists->entry_bits.memory), OV_ARG(start), OV_ARG(item), OV_ARG(place),
+                     OV_ARG(group_term), OV_ARG(group_bits), OV_ARG(lists->totals.memory)));
     if (packs)
-        OV_TRY(OV_LAUNCH(context, &lists->lists_of_packs, p->groups, p->group, OV_ARG(p->groups),
-                         OV_ARG(p->packs), OV_ARG(lists->place.memory),
+        OV_TRY(OV_LAUNCH(context, &lists->lists_of_packs, p->groups * p->team, p->group,
+                         OV_ARG(p->groups), OV_ARG(p->packs), OV_ARG(lists->place.memory),
                          OV_ARG(lists->group_term.memory), OV_ARG(lists->group_bits.memory),
                          OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory)));
 cleanup:

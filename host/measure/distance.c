@@ -239,18 +239,59 @@ cleanup:
     return status;
 }
 
+/* ---- of triangles ------------------------------------------------------------------------- */
+
+/* From `count` triangles to the chunk on the device. */
+static ovoid_status reach_batch(ovoid_context *context, ov_meter *meter, const ov_facets *facets,
+                                const float *xyz, size_t count, float *squared) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
+    const cl_uint total = (cl_uint)count, first = (cl_uint)facets->first,
+                  end = (cl_uint)facets->end;
+    OV_TRY(ov_device_get(context, &device));
+    if (!meter->reach.handle)
+        OV_TRY(ov_kernel_create(context, "distance", "triangle_distances", &meter->reach));
+    OV_TRY(ov_buffer_put(context, &meter->xyz, xyz, 9 * count * sizeof *xyz,
+                         "triangles of a surface"));
+    OV_TRY(ov_buffer_put(context, &meter->result, squared, count * sizeof *squared, "distances"));
+    OV_TRY(OV_LAUNCH(context, &meter->reach, count, ov_item_group(device), OV_ARG(total),
+                     OV_ARG(meter->xyz.memory), OV_ARG(facets->tree), OV_ARG(facets->boxes.memory),
+                     OV_ARG(first), OV_ARG(end), OV_ARG(facets->packed.memory),
+                     OV_ARG(meter->result.memory)));
+    OV_TRY(ov_buffer_read(context, &meter->result, 0, squared, count * sizeof *squared));
+cleanup:
+    return status;
+}
+
+ovoid_status ov_facets_reach(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                             const float *xyz, size_t count, float *squared) {
+    ovoid_status status = OVOID_OK;
+    const size_t leaves = facets->leaves, chunk = facets->chunk,
+                 batch = (meter->batch ? meter->batch : OV_METER_BATCH) / 3 + 1;
+    for (size_t first = 0, end; first < leaves && count > 0; first = end) {
+        end = leaves - first < chunk ? leaves : first + chunk;
+        OV_TRY(ov_facets_load(context, facets, false, first, end));
+        for (size_t k = 0, size; k < count; k += size) {
+            size = count - k < batch ? count - k : batch;
+            OV_TRY(reach_batch(context, meter, facets, xyz + 9 * k, size, squared + k));
+        }
+    }
+cleanup:
+    return status;
+}
+
 void ov_meter_destroy(ov_meter *meter) {
     ov_buffer_destroy(&meter->xyz);
     ov_buffer_destroy(&meter->result);
     ov_kernel_destroy(&meter->distances);
+    ov_kernel_destroy(&meter->reach);
     free(meter->points);
     memset(meter, 0, sizeof *meter);
 }
 
 /* ---- of vertices -------------------------------------------------------------------------- */
 
-/* squared: of the trail's vertices, which become distances, each at its vertex's place. */
-static void put_distances(const ov_trail *trail, const float *squared, float *distance) {
+void ov_trail_put_distances(const ov_trail *trail, const float *squared, float *distance) {
     for (size_t k = 0; k < trail->vertices; ++k)
         distance[ov_trail_vertex(trail, k)] = (float)sqrt((double)squared[k]);
 }
@@ -268,7 +309,7 @@ ovoid_status ov_trail_distances(ovoid_context *context, ov_meter *meter, ov_face
     }
     float *const found = squared ? squared : distance;
     OV_TRY(ov_facets_distances(context, meter, facets, &sites, found));
-    put_distances(from, found, distance);
+    ov_trail_put_distances(from, found, distance);
 cleanup:
     free(squared);
     return status;
@@ -317,166 +358,7 @@ ovoid_status ov_vertex_distances_end(ovoid_context *context, ov_meter *meter, co
         return OVOID_OK;
     OV_TRY(ov_later_end(context, &meter->later));
     OV_TRY(check_distances(context, distance, from->trail.vertices));
-    put_distances(&from->trail, distance, distance);
+    ov_trail_put_distances(&from->trail, distance, distance);
 cleanup:
-    return status;
-}
-
-/* ---- both ways ---------------------------------------------------------------------------- */
-
-/* Of the distances from one surface to the other. */
-typedef struct directed {
-    double largest, mean, square;
-} directed;
-
-static double area_of(const ovoid_mesh *mesh, size_t triangle) {
-    const uint32_t *const corner = mesh->corners + 3 * triangle;
-    double a[3], u[3], v[3];
-    ov_mesh_at(mesh, corner[0], a);
-    ov_mesh_at(mesh, corner[1], u);
-    ov_mesh_at(mesh, corner[2], v);
-    for (size_t k = 0; k < 3; ++k) {
-        u[k] -= a[k];
-        v[k] -= a[k];
-    }
-    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2],
-                 z = u[0] * v[1] - u[1] * v[0];
-    return 0.5 * sqrt(x * x + y * y + z * z);
-}
-
-/* Sums over the surface: a third of a quarter of each triangle's area at its corners, three
- * quarters of it at its centre, which integrates quadratic functions exactly. of_vertices: squared,
- * by the mesh's numbers. */
-static ovoid_status sum_distances(ovoid_context *context, const ov_trail *from,
-                                  const float *of_vertices, const float *of_centres,
-                                  directed *result) {
-    directed sum = {0.0, 0.0, 0.0};
-    double weights = 0.0;
-    for (size_t k = 0; k < from->triangles; ++k) {
-        const ovoid_status asked = ov_progress_turn(context, k, from->triangles);
-        if (asked != OVOID_OK)
-            return asked;
-        const uint32_t t = ov_trail_triangle(from, k);
-        const double area = area_of(from->mesh, t), weight[2] = {area / 12.0, 0.75 * area};
-        for (size_t i = 0; i < 4; ++i) {
-            const double square =
-                i < 3 ? of_vertices[from->mesh->corners[3 * (size_t)t + i]] : of_centres[k];
-            const double distance = sqrt(square);
-            sum.largest = fmax(sum.largest, distance);
-            sum.mean += weight[i / 3] * distance;
-            sum.square += weight[i / 3] * square;
-        }
-        weights += area;
-    }
-    if (!(weights > 0.0))
-        return ov_fail(context, OVOID_ERROR_NUMERIC, "a surface without area has no distances");
-    *result = (directed){sum.largest, sum.mean / weights, sum.square / weights};
-    return OVOID_OK;
-}
-
-/* From the points of one mesh to the triangles of the other. */
-static ovoid_status measure_directed(ovoid_context *context, const ov_trail *from,
-                                     const ov_trail *to, const double origin[3], directed *result,
-                                     float *of_vertices) {
-    ovoid_status status = OVOID_OK;
-    ov_facets facets = {0};
-    ov_meter meter = {0};
-    float *at_vertices = NULL;
-    const ov_sites sites = {.count = from->vertices + from->triangles, .trail = from};
-    float *const squared = ov_alloc(context, sites.count, sizeof *squared, "distances");
-    if (!squared)
-        return OVOID_ERROR_MEMORY;
-    OV_TRY(ov_facets_set(context, &facets, to, origin));
-    OV_TRY(ov_facets_distances(context, &meter, &facets, &sites, squared));
-    if (from->vertex) {
-        at_vertices = ov_alloc(context, from->mesh->vertices, sizeof *at_vertices, "distances");
-        if (!at_vertices) {
-            status = OVOID_ERROR_MEMORY;
-            goto cleanup;
-        }
-        for (size_t k = 0; k < from->vertices; ++k)
-            at_vertices[from->vertex[k]] = squared[k];
-    }
-    OV_TRY(sum_distances(context, from, at_vertices ? at_vertices : squared,
-                         squared + from->vertices, result));
-    if (of_vertices)
-        put_distances(from, squared, of_vertices);
-cleanup:
-    ov_facets_destroy(&facets);
-    ov_meter_destroy(&meter);
-    free(at_vertices);
-    free(squared);
-    return status;
-}
-
-/* The middle of the box about both meshes. */
-static void middle_of(const ovoid_mesh *a, const ovoid_mesh *b, double origin[3]) {
-    const ovoid_mesh *const both[2] = {a, b};
-    double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
-    for (size_t m = 0; m < 2; ++m)
-        for (size_t v = 0; v < both[m]->vertices; ++v) {
-            double at[3];
-            ov_mesh_at(both[m], v, at);
-            for (size_t k = 0; k < 3; ++k) {
-                low[k] = fmin(low[k], at[k]);
-                high[k] = fmax(high[k], at[k]);
-            }
-        }
-    for (size_t k = 0; k < 3; ++k)
-        origin[k] = 0.5 * low[k] + 0.5 * high[k];
-}
-
-static ovoid_status check_trail(ovoid_context *context, const ov_trail *trail, const char *which,
-                                bool outer_only) {
-    if (trail->triangles > 0)
-        return OVOID_OK;
-    return ov_fail(context, OVOID_ERROR_EMPTY, "the %s mesh has no %s: there are no distances",
-                   which, outer_only ? "outer component" : "triangle");
-}
-
-ovoid_status ov_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
-                               bool outer_only, ovoid_distances *distances, float *from_a,
-                               float *from_b) {
-    ovoid_status status = OVOID_OK;
-    directed forward, backward;
-    double origin[3];
-    ov_trail first = {0}, second = {0};
-    middle_of(a, b, origin);
-    OV_TRY(ov_trail_create(context, a, outer_only, &first));
-    OV_TRY(ov_trail_create(context, b, outer_only, &second));
-    OV_TRY(check_trail(context, &first, "first", outer_only));
-    OV_TRY(check_trail(context, &second, "second", outer_only));
-    OV_TRY(measure_directed(context, &first, &second, origin, &forward, from_a));
-    OV_TRY(measure_directed(context, &second, &first, origin, &backward, from_b));
-    *distances = (ovoid_distances){.hausdorff = fmax(forward.largest, backward.largest),
-                                   .forward = forward.largest,
-                                   .backward = backward.largest,
-                                   .mean = 0.5 * (forward.mean + backward.mean),
-                                   .rms = sqrt(0.5 * (forward.square + backward.square))};
-cleanup:
-    ov_trail_destroy(&first);
-    ov_trail_destroy(&second);
-    return status;
-}
-
-ovoid_status ovoid_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
-                                  bool outer_only, ovoid_distances *distances, float *from_a) {
-    float *of_vertices = NULL;
-    OV_NEED(context, context);
-    OV_NEED(context, a);
-    OV_NEED(context, b);
-    OV_NEED(context, distances);
-    if (from_a) {
-        of_vertices = ov_alloc(context, a->vertices, sizeof *of_vertices, "distances");
-        if (!of_vertices)
-            return OVOID_ERROR_MEMORY;
-    }
-    ov_progress_begin(context, "measure");
-    const ovoid_status status =
-        ov_mesh_distances(context, a, b, outer_only, distances, of_vertices, NULL);
-    ov_progress_end(context);
-    if (from_a && status == OVOID_OK)
-        memcpy(from_a, of_vertices, a->vertices * sizeof *from_a);
-    free(of_vertices);
     return status;
 }

@@ -15,7 +15,7 @@ typedef struct ov_meter {
     size_t batch;          /* 0: as above */
     const ov_watch *watch; /* asked before each batch; NULL: the context */
     double enough; /* angstrom: a distance of at most this may be told as more, up to this */
-    ov_kernel distances;
+    ov_kernel distances, reach;
     ov_buffer xyz, result; /* device */
     ov_later later;        /* the read of distances that are under way */
     float *points;         /* of a batch of a trail's */
@@ -43,6 +43,15 @@ ovoid_status ov_facets_distances(ovoid_context *context, ov_meter *meter, ov_fac
 ovoid_status ov_facets_nearer(ovoid_context *context, ov_meter *meter, ov_facets *facets,
                               const ov_sites *sites, float *squared);
 
+/* How far triangles reach from the facets at most: squared[k], which holds a bound, becomes the
+ * least over the facets of the largest squared distance of a corner of triangle k (9 floats of xyz,
+ * relative to the facets' origin) from it, if that is less. No point of the triangle is farther. */
+ovoid_status ov_facets_reach(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                             const float *xyz, size_t count, float *squared);
+
+/* squared: of the trail's vertices, which become distances, each at its vertex's place. */
+void ov_trail_put_distances(const ov_trail *trail, const float *squared, float *distance);
+
 /* distance[v] of each vertex of a mesh that is in a triangle of its trail, in angstrom; 0 for
  * others. */
 ovoid_status ov_trail_distances(ovoid_context *context, ov_meter *meter, ov_facets *facets,
@@ -55,11 +64,5 @@ ovoid_status ov_vertex_distances_begin(ovoid_context *context, ov_meter *meter, 
                                        const ov_facets *from, float *distance);
 ovoid_status ov_vertex_distances_end(ovoid_context *context, ov_meter *meter, const ov_facets *from,
                                      float *distance);
-
-/* ovoid_mesh_distances() that tells the distance of each vertex of both meshes, where not NULL;
- * those of vertices that are left out stay as they are. */
-ovoid_status ov_mesh_distances(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
-                               bool outer_only, ovoid_distances *distances, float *from_a,
-                               float *from_b);
 
 #endif

@@ -3,7 +3,7 @@
 #include "base/progress.h"
 #include "base/sized.h"
 #include "measure/cells.h"
-#include "measure/distance.h"
+#include "measure/compare.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -34,6 +34,7 @@ static const ovoid_measures unknown = {
     .deviation = NAN,
     .seconds_mesh = NAN,
     .seconds_distances = NAN,
+    .deviation_bound = NAN,
 };
 
 void ovoid_measures_init(ovoid_measures *measures, size_t size) {
@@ -79,13 +80,15 @@ static ovoid_status compare_vertices(ovoid_context *context, const ovoid_mesh *o
     ovoid_status status = OVOID_OK;
     float *const first = ov_alloc(context, original->vertices, sizeof *first, "distances");
     float *const second = ov_alloc(context, sparse->vertices, sizeof *second, "distances");
+    ov_bound bound = {0};
     if (!first || !second) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    OV_TRY(
-        ov_mesh_distances(context, original, sparse, false, &measures->distances, first, second));
+    OV_TRY(ov_mesh_distances(context, original, sparse, false, &measures->distances, first, second,
+                             &bound));
     measures->deviation = fmax(largest_of_outer(original, first), largest_of_outer(sparse, second));
+    measures->deviation_bound = fmax(bound.most, measures->deviation);
 cleanup:
     free(first);
     free(second);

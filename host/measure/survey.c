@@ -63,7 +63,7 @@ static ovoid_status mesh_sheet(ov_surveyor *s, const ov_body *bodies, size_t cou
     OV_TRY(make_mesh(s, bodies, count, made));
     if (!made->mesh)
         return OVOID_OK;
-    OV_TRY(ov_mesh_finish(s->context, made->mesh));
+    OV_TRY(ov_mesh_check(s->context, made->mesh));
     made->zone = ov_alloc(s->context, made->mesh->triangles, sizeof *made->zone, "pieces");
     made->distance = ov_alloc(s->context, made->mesh->vertices, sizeof(float), "distances");
     made->piece_of = ov_alloc(s->context, made->mesh->vertices, sizeof(uint32_t), "pieces");
@@ -231,7 +231,7 @@ static void find_pieces(ov_sheet *at) {
 /* Each piece has a place of its own that its volume counts from: what rounding leaves open between
  * cells is little beside a cavity then, however far from everything's middle it is. */
 static void add_contents(const ov_surveyor *s, const ov_sheet *at, ov_survey_side *side) {
-    const bool exact = s->options->vertices == OVOID_VERTEX_EXACT;
+    const bool exact = s->options->vertices == OVOID_VERTEX_EXACT && !s->options->flat;
     for (size_t v = 0; v < at->mesh->vertices; ++v)
         if (at->piece_of[v] != OV_NO_PIECE)
             ov_mesh_at(at->mesh, v, side->piece[at->piece_of[v]].at);

@@ -91,6 +91,7 @@ typedef struct ov_survey_options {
     double isovalue, spacing; /* of both meshes, angstrom */
     double least;             /* angstrom: what is as far as this is a spot; INFINITY: nothing is */
     ovoid_vertex_rule vertices; /* linear: areas and volumes of flat triangles */
+    bool flat;                  /* so, too: they only tell outer surfaces from cavities */
     double halo;     /* angstrom: so far about the cell the terms make the surfaces what they are,
                         and OV_SURVEY_ROOM steps more; 0: nothing is said of that */
     bool sums;       /* of distances, with a halo */

@@ -180,8 +180,8 @@ cleanup:
     return status;
 }
 
-void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
-                           ov_content *content) {
+static inline void add_flat(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
+                            ov_content *content) {
     double a[3], u[3], v[3], normal[3];
     corners_at(mesh, triangle, a, u, v);
     subtract(u, a, u);
@@ -190,6 +190,11 @@ void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double
     cross(u, v, normal);
     content->area += 0.5 * sqrt(dot(normal, normal));
     content->volume += dot(a, normal) / 6.0;
+}
+
+void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
+                           ov_content *content) {
+    add_flat(mesh, triangle, origin, content);
 }
 
 void ov_mesh_flat_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]) {
@@ -211,12 +216,13 @@ static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh)
         return OVOID_ERROR_MEMORY;
     for (size_t v = mesh->vertices; v-- > 0;)
         first[mesh->component_of[v]] = (uint32_t)v;
-    for (size_t t = 0; t < mesh->triangles; ++t) {
+    for (size_t t = 0; t < mesh->triangles;) { /* neighbours are mostly of one component */
         const uint32_t c = mesh->component_of[mesh->corners[3 * t]];
         ov_content content = {mesh->component[c].area, mesh->component[c].volume};
         double origin[3];
         ov_mesh_at(mesh, first[c], origin);
-        ov_mesh_flat_triangle(mesh, t, origin, &content);
+        for (; t < mesh->triangles && mesh->component_of[mesh->corners[3 * t]] == c; ++t)
+            add_flat(mesh, t, origin, &content);
         mesh->component[c].area = content.area;
         mesh->component[c].volume = content.volume;
     }
@@ -228,7 +234,7 @@ static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh)
 
 /* ---- making ------------------------------------------------------------------------------- */
 
-static ovoid_status check_arrays(ovoid_context *context, const ovoid_mesh *mesh) {
+ovoid_status ov_mesh_check(ovoid_context *context, const ovoid_mesh *mesh) {
     if (mesh->vertices > UINT32_MAX - 1 || mesh->triangles > UINT32_MAX - 1)
         return ov_fail(context, OVOID_ERROR_LIMIT,
                        "a mesh holds at most 2^32 - 2 vertices and triangles, not %zu and %zu",
@@ -291,7 +297,7 @@ static ovoid_mesh *take_arrays(ovoid_context *context, const ovoid_mesh *arrays)
 
 ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(check_arrays(context, mesh));
+    OV_TRY(ov_mesh_check(context, mesh));
     if (mesh->xyz && !mesh->normals)
         OV_TRY(make_normals(context, mesh));
     mesh->component_of =

@@ -61,12 +61,14 @@ static inline void ov_mesh_centre(const ovoid_mesh *mesh, size_t triangle, doubl
 ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
                            uint32_t *corners, size_t triangles, ovoid_mesh **mesh);
 
-/* A light mesh: offsets from origin, and normals or NULL for none. Its components are found by
- * ov_mesh_finish(), which is to follow. */
+/* A light mesh: offsets from origin, and normals or NULL for none. ov_mesh_finish() is to follow,
+ * which checks the arrays and finds the components, or ov_mesh_check() where nobody asks for these.
+ */
 ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const double origin[3],
                                  float *normals, size_t vertices, uint32_t *corners,
                                  size_t triangles, ovoid_mesh **mesh);
 ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh);
+ovoid_status ov_mesh_check(ovoid_context *context, const ovoid_mesh *mesh);
 
 /* Component of a triangle. */
 static inline const ovoid_component *ov_mesh_component_of_triangle(const ovoid_mesh *mesh,

@@ -213,9 +213,48 @@ static void make_triangles(ov_random *random, size_t triangles, double *xyz, uin
     }
 }
 
-/* squared: of `count` points (3 floats each), allocated. */
+/* How far a triangle reaches from a mesh: from the triangle of it that says least. */
+static double reach_of(const float *triangle, const ovoid_mesh *mesh) {
+    double least = INFINITY, corner[3][3];
+    for (size_t i = 0; i < 9; ++i)
+        corner[i / 3][i % 3] = triangle[i];
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        const double *to[3];
+        double most = 0.0;
+        for (size_t i = 0; i < 3; ++i)
+            to[i] = mesh->xyz + 3 * (size_t)mesh->corners[3 * t + i];
+        for (size_t i = 0; i < 3; ++i)
+            most = fmax(most, ov_twin_triangle_distance(corner[i], to[0], to[1], to[2]));
+        least = fmin(least, most);
+    }
+    return least;
+}
+
+/* Of the points three by three. */
+static ovoid_status check_reach(ov_checking *c, ov_meter *meter, ov_facets *facets,
+                                const float *points, size_t count) {
+    ovoid_status status = OVOID_OK;
+    float *const squared = ov_alloc(c->context, count, sizeof *squared, "distances of a check");
+    if (!squared)
+        return OVOID_ERROR_MEMORY;
+    for (size_t k = 0; k < count; ++k)
+        squared[k] = k % 2 ? INFINITY : 4.0f;
+    OV_TRY(ov_facets_reach(c->context, meter, facets, points, count, squared));
+    for (size_t k = 0; k < count; ++k) {
+        const double reach = reach_of(points + 9 * k, facets->trail.mesh),
+                     wanted = k % 2 ? reach : fmin(reach, 2.0);
+        ov_expect_near(c, sqrt((double)squared[k]), wanted, 2e-6 * fmax(wanted, 1.0),
+                       "distances: triangle", k);
+    }
+cleanup:
+    free(squared);
+    return status;
+}
+
+/* squared: of `count` points (3 floats each), allocated. With c the triangles that they make are
+ * checked, too. */
 static ovoid_status measure(ovoid_context *context, const ovoid_mesh *mesh, const float *points,
-                            size_t count, float **squared) {
+                            size_t count, float **squared, ov_checking *c) {
     static const double origin[3] = {0.0, 0.0, 0.0};
     ovoid_status status = OVOID_OK;
     ov_trail trail = {0};
@@ -229,6 +268,8 @@ static ovoid_status measure(ovoid_context *context, const ovoid_mesh *mesh, cons
     OV_TRY(ov_trail_create(context, mesh, false, &trail));
     OV_TRY(ov_facets_set(context, &facets, &trail, origin));
     OV_TRY(ov_facets_distances(context, &meter, &facets, &sites, made));
+    if (c)
+        OV_TRY(check_reach(c, &meter, &facets, points, count / 3));
     *squared = made;
 cleanup:
     if (status != OVOID_OK)
@@ -252,7 +293,7 @@ ovoid_status ov_check_distances(ov_checking *c) {
         goto cleanup;
     make_triangles(&random, triangles, xyz, corners);
     OV_TRY(ovoid_mesh_create(context, xyz, NULL, 3 * triangles, corners, triangles, &mesh));
-    OV_TRY(measure(context, mesh, points, count, &squared));
+    OV_TRY(measure(context, mesh, points, count, &squared, c));
     for (size_t k = 0; k < count; ++k) {
         const double at[3] = {points[3 * k], points[3 * k + 1], points[3 * k + 2]};
         const double wanted = ov_twin_mesh_distance(at, mesh, false);
@@ -292,7 +333,7 @@ ovoid_status ov_check_many_distances(ov_checking *c) {
         memcpy(corners + 6 * (size_t)n, own, sizeof own);
     }
     OV_TRY(ovoid_mesh_create(context, xyz, NULL, vertices, corners, 2 * SIDE * SIDE, &mesh));
-    OV_TRY(measure(context, mesh, points, count, &squared));
+    OV_TRY(measure(context, mesh, points, count, &squared, NULL));
     for (size_t k = 0; k < count; ++k)
         ov_expect_near(c, sqrt((double)squared[k]), fabs((double)points[3 * k + 2]), 2e-5,
                        "distances, many points: point", k);

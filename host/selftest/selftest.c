@@ -28,7 +28,7 @@ static const ov_check checks[] = {
      "march_signs march_count march_number march_get march_put march_vertices march_boxes "
      "march_triangles march_refine march_place",
      true, false, ov_check_mesh},
-    {"distances", "pack_leaves distances", true, false, ov_check_distances},
+    {"distances", "pack_leaves distances triangle_distances", true, false, ov_check_distances},
     {"picture", "trace trace_ellipsoids compare shade", false, false, ov_check_picture},
     {"many points", "field", false, false, ov_check_many_points},
     {"many terms", "packs_of_terms scan_lists hand_out_entries lists_of_packs field moments gram",

@@ -45,6 +45,9 @@ typedef struct ovoid_measures {
                          does not jump when the neck of a tunnel opens or closes, and unlike that of
                          the whole ones not with a small cavity. What a tolerance is about. */
     double seconds_mesh, seconds_distances;
+    /* No point of a triangle of either outer surface's mesh is farther than this from the other
+     * whole mesh, angstrom; NAN where that is not known: without distances, and cell by cell. */
+    double deviation_bound;
 } ovoid_measures;
 
 /* isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices, with distances; size is sizeof

@@ -116,8 +116,10 @@ def test_the_tool_says_the_same(peptide_path, peptide, model, tool, tmp_path):
     assert model.report.ellipsoids == report["ellipsoids"] == 12
     measures = model.measure(peptide)
     ours = [measures.area.original, measures.volume.model, measures.deviation]
+    ours += [measures.deviation_bound]
     ours += [measures.hausdorff, measures.mean]
     said = [report["area"]["original"], report["volume"]["sparse"], report["deviation"]]
+    said += [report["deviation_bound"]]
     said += [report["hausdorff"], report["mean_distance"]]
     assert ours == pytest.approx(said, rel=1e-14)
 

@@ -149,6 +149,15 @@ static int is_adaptive(const cJSON *report) {
     return cJSON_IsString(method) && strcmp(method->valuestring, "adaptive") == 0;
 }
 
+/* What lies between vertices is bounded, a little above where they are, but for large surfaces. */
+static void check_bound(const cJSON *report) {
+    if (cJSON_IsNull(find(report, "deviation_bound")))
+        return;
+    const double deviation = number(report, "deviation"), bound = number(report, "deviation_bound");
+    expect(bound >= deviation && bound <= 1.5 * deviation + 0.5, "deviation_bound", bound,
+           deviation);
+}
+
 /* What was reached is what was measured. */
 static void check_goal(const cJSON *report) {
     const cJSON *name = find(report, "goal.name"), *reached = find(report, "goal.reached");
@@ -184,6 +193,7 @@ static void check_keys(const cJSON *report) {
         check_absent(report, l1_numbers, LENGTH(l1_numbers));
         check_absent(report, l1_texts, LENGTH(l1_texts));
         check_goal(report);
+        check_bound(report);
         return;
     }
     check_numbers(report, l1_numbers, LENGTH(l1_numbers));

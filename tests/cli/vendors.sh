@@ -24,6 +24,11 @@ $hidden LD_LIBRARY_PATH="$PWD/libraries" "$OVOID" fit a.xyzr
 expect_code 5
 expect_hint
 
+# Some loaders do not read the other place where it can be named.
+run env OCL_ICD_VENDORS="$PWD/none/" OPENCL_VENDOR_PATH="$PWD/none" LD_LIBRARY_PATH="$PWD/libraries" \
+    OCL_ICD_FILENAMES=libpocl.so.2:libnvidia-opencl.so.1 "$OVOID" devices
+expect_err "no vendors file names it (OCL_ICD_FILENAMES does, which not every loader reads)"
+
 # The file is written: then it is not that.
 echo "$library" >none/nvidia.icd
 $hidden LD_LIBRARY_PATH="$PWD/libraries" "$OVOID" devices

@@ -86,6 +86,7 @@ ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_
     const bool by_tolerance = options->adaptive.goal == OVOID_GOAL_TOLERANCE;
     ov_survey_options wanted = {.isovalue = options->isovalue,
                                 .spacing = options->adaptive.mesh_spacing,
+                                .flat = true,
                                 .least = by_tolerance ? options->adaptive.tolerance : INFINITY};
     ov_scene scene = {0};
     ov_quadric *original = NULL;

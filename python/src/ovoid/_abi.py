@@ -229,6 +229,7 @@ Measures = _structure(
     ("distances", Distances),
     ("distances_outer", Distances),
     *((name, c_double) for name in ("deviation", "seconds_mesh", "seconds_distances")),
+    ("deviation_bound", c_double),
 )
 ExportOptions = _structure(
     "ovoid_export_options",

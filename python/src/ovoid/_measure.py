@@ -49,6 +49,9 @@ class Measures:
     deviation : float
         Largest distance of a point of either outer surface from the other whole surface (Å): what
         a tolerance is about.
+    deviation_bound : float
+        No point of either outer surface's mesh, between vertices too, is farther than this from
+        the other whole mesh (Å); nan of large surfaces, which are measured cell by cell.
     """
 
     area: Pair
@@ -60,6 +63,7 @@ class Measures:
     distances: Distances
     distances_outer: Distances
     deviation: float
+    deviation_bound: float
 
     @property
     def hausdorff(self) -> float:
@@ -114,4 +118,5 @@ def measure_fields(
         distances=distances_of(raw.distances),
         distances_outer=distances_of(raw.distances_outer),
         deviation=raw.deviation,
+        deviation_bound=raw.deviation_bound,
     )

@@ -120,7 +120,7 @@ cleanup:
 static ovoid_status act(ov_adaptive *f, const char *stage, ov_trial *t, const ov_spots *spots,
                         growth *g) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(ov_adaptive_emphasise(f, spots));
+    OV_TRY(ov_adaptive_emphasise(f, spots, ov_tuned.spots_emphasis_reach, ov_tuned.spots_emphasis));
     OV_TRY(ov_places_meet(f->context, &g->places, spots, ov_tuned.spots_apart, g->before));
     OV_TRY(rebuild(f, t, spots, g));
     OV_TRY(split(f, t, spots, g));

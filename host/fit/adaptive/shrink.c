@@ -7,8 +7,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* What happens where merges are off. */
+typedef struct settling {
+    uint32_t chances, back_rounds, steps;
+    double emphasis, reach;
+} settling;
+
 /* A model that shrinks. */
 typedef struct shrinking {
+    settling how;
     ov_trial next;      /* the best model merged */
     uint32_t *parents;  /* as of ov_merge_cheapest(): in the best model */
     ov_places failed;   /* where merging was too much */
@@ -22,9 +29,19 @@ typedef struct shrinking {
     size_t idle_rounds, idle_tries; /* since */
 } shrinking;
 
+/* Parts of a molecule have seams to keep, which chances make worse where images meet. */
+static settling settling_of(const ov_adaptive *f) {
+    if (f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0)
+        return (settling){0, ov_tuned.shrink_part_back_rounds, ov_tuned.refine_local_steps,
+                          ov_tuned.spots_emphasis, ov_tuned.spots_emphasis_reach};
+    return (settling){ov_tuned.shrink_chances, ov_tuned.shrink_back_rounds, ov_tuned.shrink_steps,
+                      ov_tuned.shrink_emphasis, ov_tuned.shrink_emphasis_reach};
+}
+
 static ovoid_status shrinking_create(ov_adaptive *f, shrinking *s) {
     ovoid_status status = OVOID_OK;
-    *s = (shrinking){.share = ov_tuned.shrink_share,
+    *s = (shrinking){.how = settling_of(f),
+                     .share = ov_tuned.shrink_share,
                      .limit = ov_tuned.shrink_done_first,
                      .most = ov_tuned.shrink_done * (size_t)f->options->adaptive.effort};
     OV_TRY(ov_trial_create(f, &s->next));
@@ -119,7 +136,7 @@ static ovoid_status adapt(ov_adaptive *f, shrinking *s) {
         if (is_merged(s, i))
             memcpy(merged.spot[merged.count++].at, centre_of(s->next.x, i), sizeof merged.spot->at);
     OV_TRY(choose_near(f, &merged, ov_tuned.shrink_adapt, s));
-    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", ov_tuned.refine_local_steps, s->chosen));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", s->how.steps, s->chosen));
 cleanup:
     ov_spots_destroy(&merged);
     return status;
@@ -218,31 +235,44 @@ static void take_back(const ov_trial *best, shrinking *s) {
     s->next.count = count;
 }
 
-/* Takes back the merges nearest to the spots, and lets what is near adapt. */
+/* Asks for more at the spots, takes back the merges nearest to those that are further off than
+ * `limit` (angstrom), and lets what is near all spots adapt. */
 static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spots *spots,
-                             shrinking *s) {
+                             double limit, shrinking *s) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(ov_adaptive_emphasise(f, spots));
+    ov_spots far = {.spot = spots->spot}; /* the worst come first */
+    while (far.count < spots->count && far.spot[far.count].distance > limit)
+        ++far.count;
+    OV_TRY(ov_adaptive_emphasise(f, spots, s->how.reach, s->how.emphasis));
     memset(s->chosen, 0, s->next.count * sizeof *s->chosen);
-    OV_TRY(choose_nearest(f, s, spots));
+    if (far.count > 0)
+        OV_TRY(choose_nearest(f, s, &far));
     OV_TRY(remember(f, best, s));
     take_back(best, s);
     OV_TRY(choose_near(f, spots, ov_tuned.shrink_back, s));
-    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", ov_tuned.refine_local_steps, s->chosen));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", s->how.steps, s->chosen));
 cleanup:
     return status;
 }
 
-/* Where merging was too much: takes merges back, and where that is not enough, grows. */
+/* How far off a spot may be in round n of settling before the merge there is taken back: less in
+ * each round, and nothing once merges have had all their chances. */
+static double patience(double tolerance, uint32_t n, uint32_t chances) {
+    const double left = 1.0 - (double)n / fmax((double)chances, 1.0);
+    return n < chances ? tolerance * (1.0 + (ov_tuned.shrink_chance - 1.0) * left) : 0.0;
+}
+
+/* Where merging was too much: asks for more there, takes back the merges that this does not help,
+ * and where that is not enough, grows. */
 static ovoid_status settle(ov_adaptive *f, double tolerance, const ov_trial *best, shrinking *s) {
     ovoid_status status = OVOID_OK;
     ov_spots spots = {0};
     const ov_growing how = {
         .stage = "shrink", .most = best->count - 1, .rounds = ov_tuned.shrink_grow_rounds};
+    const uint32_t rounds = s->how.chances + s->how.back_rounds;
     OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
-    for (uint32_t n = 0;
-         n < ov_tuned.shrink_back_rounds && spots.count > 0 && s->next.count < best->count; ++n) {
-        OV_TRY(back_off(f, best, &spots, s));
+    for (uint32_t n = 0; n < rounds && spots.count > 0 && s->next.count < best->count; ++n) {
+        OV_TRY(back_off(f, best, &spots, patience(tolerance, n, s->how.chances), s));
         OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
     }
     OV_TRY(ov_owner_merge(f->context, s->parents, s->next.count, best->count, best->owner, f->atoms,
@@ -293,7 +323,7 @@ ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, const ov_shrin
         }
         OV_TRY(adapt(f, &s));
         OV_TRY(settle(f, tolerance, best, &s));
-        if (s.next.count < before && ov_trial_holds(&s.next, tolerance))
+        if (s.next.count < before + (s.how.chances > 0) && ov_trial_holds(&s.next, tolerance))
             ov_trial_swap(&s.next, best);
         choose_share(&s, tries, before - best->count);
         idle = is_idle(&s, how, tries, best->count);

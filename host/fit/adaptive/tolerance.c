@@ -21,10 +21,10 @@ ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, si
     return status;
 }
 
-ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots) {
+ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots, double reach,
+                                   double factor) {
     return ov_target_emphasise(f->context, &f->target, spots->spot->at, sizeof *spots->spot,
-                               spots->count, ov_tuned.spots_emphasis_reach,
-                               ov_tuned.spots_emphasis);
+                               spots->count, reach, factor);
 }
 
 /* From the count that molecules of this size need, about, to a model that holds. */
@@ -64,13 +64,14 @@ static ovoid_status grow_start(ov_adaptive *f, double tolerance, ov_trial *t) {
     ov_spots spots = {0};
     ov_growing how = {.stage = "grow", .most = f->atoms, .rounds = ov_tuned.grow_rounds};
     how.patience = is_frame(f) ? ov_tuned.motion_patience : 0;
+    const double too_many = is_frame(f) ? ov_tuned.motion_too_many : ov_tuned.start_too_many;
     OV_TRY(ov_adaptive_take_start(f, t));
     OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
     if (f->options->adaptive.steps == 0 || ov_trial_holds(t, tolerance))
         goto cleanup;
     OV_TRY(ov_adaptive_refine_fully(f, t, "refine"));
     OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
-    if ((double)spots.count <= ov_tuned.start_too_many * (double)t->count)
+    if ((double)spots.count <= too_many * (double)t->count)
         OV_TRY(ov_adaptive_grow(f, tolerance, &how, t, &spots));
 cleanup:
     ov_spots_destroy(&spots);
@@ -87,12 +88,16 @@ static ovoid_status take_atoms(ov_adaptive *f, ov_trial *t) {
  * ellipsoids than frames can do with, and some, they are made fewer. */
 static ovoid_status shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
     const uint32_t effort = f->options->adaptive.effort;
-    const bool frame = is_frame(f);
+    const bool frame = is_frame(f),
+               part = f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0;
     const double slack = 1.0 + ov_tuned.motion_slack;
-    const ov_shrinking how = {
-        .least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
-        .idle_rounds = effort * (frame ? ov_tuned.motion_idle_rounds : ov_tuned.shrink_idle_rounds),
-        .idle_tries = effort * (frame ? ov_tuned.motion_idle_tries : ov_tuned.shrink_idle_tries)};
+    const ov_shrinking how = {.least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
+                              .idle_rounds = effort * (frame  ? ov_tuned.motion_idle_rounds
+                                                       : part ? ov_tuned.shrink_part_idle_rounds
+                                                              : ov_tuned.shrink_idle_rounds),
+                              .idle_tries = effort * (frame  ? ov_tuned.motion_idle_tries
+                                                      : part ? ov_tuned.shrink_part_idle_tries
+                                                             : ov_tuned.shrink_idle_tries)};
     const ovoid_status status = ov_adaptive_shrink(f, tolerance, &how, best);
     f->fewest = best->count;
     if (frame) { /* if that many are there still, it takes so many */

@@ -24,8 +24,10 @@ bool ov_trial_holds(const ov_trial *t, double tolerance);
 ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
                                ov_spots *spots);
 
-/* Makes the points about the spots weigh more from now on. */
-ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots);
+/* Makes the points within `reach` (angstrom) of the spots weigh `factor` times as much from now on.
+ */
+ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots, double reach,
+                                   double factor);
 
 /* Adds ellipsoids at the spots, as of ov_adaptive_spots(), and where the model is off after that,
  * until the tolerance holds: *spots are none then. */

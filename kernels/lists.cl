@@ -152,9 +152,7 @@ static inline uint2 ov_sum_before(const uint value, const uint sharer, __local u
     barrier(CLK_LOCAL_MEM_FENCE);
     return sums;
 }
-#endif
 
-#if OV_BY_TEAM
 /* Groups that a team tests side by side, and how many they may hand on to the level below. */
 #define OV_ABREAST (OV_TEAM / OV_GROUP)
 #define OV_HANDED (OV_ABREAST * OV_GROUP)

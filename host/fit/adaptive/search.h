@@ -52,6 +52,11 @@ struct ov_adaptive {
     const struct ov_trial *held;
 };
 
+/* Whether it is of a part of a molecule, with something around it. */
+static inline bool ov_adaptive_is_part(const ov_adaptive *f) {
+    return f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0;
+}
+
 /* A model with what is known of it. */
 typedef struct ov_trial {
     double *x; /* room for capacity ellipsoids */

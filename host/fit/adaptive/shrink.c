@@ -31,7 +31,7 @@ typedef struct shrinking {
 
 /* Parts of a molecule have seams to keep, which chances make worse where images meet. */
 static settling settling_of(const ov_adaptive *f) {
-    if (f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0)
+    if (ov_adaptive_is_part(f))
         return (settling){0, ov_tuned.shrink_part_back_rounds, ov_tuned.refine_local_steps,
                           ov_tuned.spots_emphasis, ov_tuned.spots_emphasis_reach};
     return (settling){ov_tuned.shrink_chances, ov_tuned.shrink_back_rounds, ov_tuned.shrink_steps,

@@ -88,8 +88,7 @@ static ovoid_status take_atoms(ov_adaptive *f, ov_trial *t) {
  * ellipsoids than frames can do with, and some, they are made fewer. */
 static ovoid_status shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
     const uint32_t effort = f->options->adaptive.effort;
-    const bool frame = is_frame(f),
-               part = f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0;
+    const bool frame = is_frame(f), part = ov_adaptive_is_part(f);
     const double slack = 1.0 + ov_tuned.motion_slack;
     const ov_shrinking how = {.least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
                               .idle_rounds = effort * (frame  ? ov_tuned.motion_idle_rounds

@@ -108,6 +108,13 @@ static void contexts_and_devices(void **state) {
     ANSWERS(NULL, ovoid_context_device_at, NULL, 0);
     ANSWERS(0, ovoid_context_device_count, NULL);
     ANSWERS(0, ovoid_context_count, NULL, OVOID_COUNT_LAUNCHES);
+    size_t many = 7;
+    ANSWERS(NULL, ovoid_context_tasks, NULL, &many);
+    assert_int_equal(many, 0);
+    many = 7;
+    ANSWERS(NULL, ovoid_context_rank_times, NULL, &many);
+    assert_int_equal(many, 0);
+    assert_null(ovoid_context_tasks(all.context, NULL)); /* no fit yet */
     REFUSED(ovoid_context_profile, context, NULL, true);
     REFUSED(ovoid_selftest, context, NULL, NULL, NULL, NULL, NULL);
     DOES_NOTHING(ovoid_selftest_options_init, NULL, sizeof(ovoid_selftest_options));

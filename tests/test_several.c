@@ -99,7 +99,7 @@ static ovoid_status perform(play *p, ovoid_context *context, size_t parts, size_
         p->part_of[n].colour = n % 4 == 3;
         p->on[n] = NOBODY;
     }
-    const ovoid_status status = ov_parts_work(context, &cut, jobs, &work);
+    const ovoid_status status = ov_parts_work(context, &cut, jobs, &work, NULL);
     pthread_cond_destroy(&p->changed);
     pthread_mutex_destroy(&p->lock);
     return status;

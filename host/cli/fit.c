@@ -162,6 +162,8 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
     }
     ovoid_context_on_progress(job->context, on_progress, job);
     ovoid_status status = reach(job, &options, now);
+    if (level == 0 && !fit_work_take(&job->work, job->context, job->profile.wanted))
+        return OVOID_ERROR_MEMORY;
     ovoid_context_on_progress(job->context, cli_on_progress, NULL);
     if (status == OVOID_ERROR_CANCELLED && now->model && job->out_of_time && !cli_interrupted()) {
         now->stopped = true;
@@ -458,6 +460,7 @@ void fit_job_destroy(fit_job *job) {
     for (size_t i = 0; i < FIT_LEVELS_MAX; i++)
         ovoid_model_destroy(&job->levels[i].model);
     cli_profile_destroy(&job->profile);
+    fit_work_destroy(&job->work);
     ovoid_molecule_destroy(&job->molecule);
     fit_outputs_destroy(job);
 }

@@ -35,14 +35,9 @@ uint32_t ranks_count(void) {
 
 /* An ovoid_exchange's. */
 static int gather(const void *mine, void *all, const uint64_t *sizes, void *user) {
-    unsigned char *at = all;
     (void)user;
     ++gathers;
-    for (uint32_t rank = 0; rank < place.ranks; at += sizes[rank++]) {
-        if (rank == place.rank && sizes[rank] > 0)
-            memcpy(at, mine, (size_t)sizes[rank]);
-        mpi_share(at, (size_t)sizes[rank], rank);
-    }
+    mpi_gather(mine, all, sizes, &place);
     return 0;
 }
 

@@ -23,14 +23,20 @@ for n in 1 2 3 4; do
     expect_silent
     once "32 parts" "$out"
     [ $n = 1 ] || once ", $n ranks" "$out"
+    [ $n = 1 ] || once "work      $n workers of $n ranks: busy " "$out"
     cmp -s one.ovoid ranks.ovoid || fail "$n ranks should make the model that one process makes"
     rm ranks.ovoid
 done
 make_helix 130 b.xyzr # within a tolerance, in levels, by several workers; measured at the end
 run "$OVOID" fit b.xyzr -o b.ovoid --part-atoms 64 --tolerance 1 --levels 2 -q
 expect_code 0
-ranks 2 fit b.xyzr -o c.ovoid --part-atoms 64 --tolerance 1 --levels 2 --jobs 2 --report r.json
+ranks 2 fit b.xyzr -o c.ovoid --part-atoms 64 --tolerance 1 --levels 2 --jobs 2 --report r.json --profile
 expect_code 0
+once "work      4 workers of 2 ranks: busy " "$out"
+once "rank              workers" "$out"
+[ "$(grep -c '"share_waiting"' r.json)" -eq 2 ] || fail "both ranks should be in the report"
+[ "$(grep -c '"kind":.*"fit"' r.json)" -eq 4 ] || fail "all parts should be in the report, as tasks"
+grep -q '^field  *[1-9]' "$out" || fail "kernels of a rank's workers should be counted"
 cmp -s b.ovoid c.ovoid || fail "two ranks should make the model that one process makes"
 cmp -s b.level2.ovoid c.level2.ovoid || fail "the second level should be the same, too"
 rm [bc].*ovoid r.json

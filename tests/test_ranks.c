@@ -357,6 +357,20 @@ static ovoid_molecule *pair(ovoid_context *context) {
     return molecule;
 }
 
+/* The same made of its unit and placements, as one rank sends them to another. */
+static ovoid_molecule *placed_again(ovoid_context *context, const ovoid_molecule *from) {
+    ovoid_molecule *molecule = NULL;
+    ovoid_unit_part part;
+    size_t count;
+    const ovoid_placement *const placed = ovoid_molecule_placements(from, &count);
+    const double *const xyzr = ovoid_molecule_unit_xyzr(from);
+    const size_t atoms = ovoid_molecule_unit_atoms(from);
+    part.atoms = ovoid_molecule_part(from, 0, &part.count);
+    test_check(context, ovoid_molecule_create_placed(context, xyzr, atoms, &part, 1, placed, count,
+                                                     &molecule));
+    return molecule;
+}
+
 /* One unit of an assembly is fitted for all, and its pieces go on in images of it. */
 static void units_are_those_of_one(void **state) {
     ovoid_molecule *molecule = pair(*state);
@@ -368,7 +382,9 @@ static void units_are_those_of_one(void **state) {
     test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
     assert_int_equal(result.units, 2);
     assert_in_range(result.parts, 3, 8);
+    ovoid_molecule *again = placed_again(*state, molecule);
     gather_ranks(2, molecule, &options);
+    all_ranks[1].molecule = again;
     run_ranks();
     expect_models(model, &result);
     assert_int_equal(all_ranks[1].result.units, 2);
@@ -379,6 +395,7 @@ static void units_are_those_of_one(void **state) {
     expect_all(OVOID_ERROR_ARGUMENT, "rank 1 has other");
     dismiss_ranks();
     ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&again);
     ovoid_molecule_destroy(&molecule);
 }
 

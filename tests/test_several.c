@@ -344,6 +344,7 @@ static void a_lost_device_changes_no_bits(void **state) {
                  {1, 2, CL_OUT_OF_RESOURCES},
                  {2, 2, CL_MEM_OBJECT_ALLOCATION_FAILURE},
                  {1, 200, -9999},
+                 {2, 200, CL_MEM_OBJECT_ALLOCATION_FAILURE},
                  {2, 300, CL_OUT_OF_RESOURCES}};
     case_of c;
     (void)state;

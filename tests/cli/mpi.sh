@@ -66,6 +66,17 @@ expect_code 0
 once "1 part cannot keep 2 ranks busy" "$err"
 rm s.pqr s1.ovoid s3.ovoid
 
+# Devices that come to other bits, here by other shapes of kernels: the same model whoever is faster, and a warning.
+for name in u1 u2; do
+    run timeout 300 mpirun -n 1 "$OVOID" fit a.xyzr $parts -o $name.ovoid : \
+        -n 1 -x OVOID_SHAPE=4x1 "$OVOID" fit a.xyzr $parts -o $name.ovoid
+    expect_code 0
+    once "the ranks have different devices or drivers" "$err"
+done
+cmp -s u1.ovoid u2.ovoid || fail "ranks of different devices should make the same model again"
+cmp -s one.ovoid u1.ovoid && fail "other shapes were to come to other bits"
+rm u1.ovoid u2.ovoid
+
 # What cannot be shared rank 0 does alone.
 ranks 3 fit b.xyzr --tolerance 1 --no-measure
 expect_code 0

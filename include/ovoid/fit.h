@@ -99,8 +99,8 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
  * beginning, and refused on all of them (OVOID_ERROR_ARGUMENT) with what it is; only unequal
  * devices are no more than a warning on rank 0, for they may come to other last bits. What one rank
  * meets, an error or a progress callback that stops, ends the fit on all of them with its status
- * and its text, which names the rank, when next they exchange: at the latest when each has done the
- * parts that it is at. What is not fitted in parts each rank fits by itself, to the same model. */
+ * and its text, which names the rank, when next they exchange: every few milliseconds while their
+ * workers are at parts. What is not fitted in parts each rank fits by itself, to the same model. */
 typedef struct ovoid_exchange { /* 24 bytes */
     uint32_t rank, ranks;       /* of this process, from 0, and how many there are */
     /* Gives all ranks the bytes of all. `mine` has sizes[rank] of them, and `all` gets those of
@@ -108,8 +108,10 @@ typedef struct ovoid_exchange { /* 24 bytes */
      * room for. `sizes`, one for each rank, are the same on all of them, and a size may be 0. All
      * arrays are the library's, and are theirs until it returns. Every rank calls it equally often
      * and in the same order, on the thread that called the library; it returns when the bytes are
-     * there, however long the other ranks take. Not 0: they cannot be exchanged any more; the fit
-     * then ends on this rank with OVOID_ERROR_IO, without another call. */
+     * there, however long the other ranks take. It is called some hundred times a second, mostly
+     * with 8 bytes of each rank, and waits best without taking a core from the workers. Not 0: they
+     * cannot be exchanged any more; the fit then ends on this rank with OVOID_ERROR_IO, without
+     * another call. */
     int (*gather)(const void *mine, void *all, const uint64_t *sizes, void *user);
     void *user;
 } ovoid_exchange;

@@ -965,6 +965,75 @@ static size_t mutate(char *bytes, size_t size, size_t room, uint64_t *seed) {
     return size;
 }
 
+static const double two_atoms[8] = {1, 0, 0, 1.5, 0, 2, 0, 1.2};
+
+/* A part of a unit of two atoms in one place, all of it in another. */
+static void assemblies_are_made_from_arrays(void **state) {
+    static const uint32_t second[1] = {1};
+    const ovoid_unit_part parts[2] = {{second, 1}, {NULL, 2}};
+    const ovoid_placement placements[2] = {{.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .part = 0},
+                                           {.rotation = {-1, 0, 0, 0, -1, 0, 0, 0, 1},
+                                            .translation = {0, 0, 5},
+                                            .part = 1,
+                                            .first = 9}};
+    static const double all[12] = {0, 2, 0, 1.2, -1, 0, 5, 1.5, 0, -2, 5, 1.2};
+    ovoid_molecule *molecule = NULL;
+    size_t count;
+    (void)state;
+    assert_int_equal(
+        ovoid_molecule_create_placed(context, two_atoms, 2, parts, 2, placements, 2, &molecule),
+        OVOID_OK);
+    assert_int_equal(ovoid_molecule_atoms(molecule), 3);
+    assert_int_equal(ovoid_molecule_unit_atoms(molecule), 2);
+    for (size_t k = 0; k < 12; ++k)
+        assert_true(ovoid_molecule_xyzr(molecule)[k] == all[k]);
+    assert_int_equal(ovoid_molecule_placements(molecule, &count)[1].first, 1);
+    assert_int_equal(count, 2);
+    ovoid_molecule_destroy(&molecule);
+    assert_int_equal(
+        ovoid_molecule_create_placed(context, two_atoms, 2, NULL, 0, placements, 1, &molecule),
+        OVOID_OK);
+    assert_int_equal(ovoid_molecule_atoms(molecule), 2);
+    ovoid_molecule_destroy(&molecule);
+}
+
+static void refuse_placed(const ovoid_unit_part *parts, const ovoid_placement *placement,
+                          const char *text) {
+    ovoid_molecule *molecule = NULL;
+    assert_int_equal(
+        ovoid_molecule_create_placed(context, two_atoms, 2, parts, 1, placement, 1, &molecule),
+        OVOID_ERROR_ARGUMENT);
+    print_message("%s\n", ovoid_context_error(context));
+    assert_non_null(strstr(ovoid_context_error(context), text));
+    assert_null(molecule);
+}
+
+static void assemblies_that_are_none_are_refused(void **state) {
+    static const uint32_t beyond[1] = {2}, twice[2] = {1, 1};
+    const ovoid_unit_part all = {NULL, 2}, some = {NULL, 1}, none = {beyond, 0};
+    const ovoid_unit_part far = {beyond, 1}, same = {twice, 2};
+    const ovoid_placement here = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    ovoid_placement placement = here;
+    ovoid_molecule *molecule = NULL;
+    (void)state;
+    refuse_placed(&some, &here, "part 0 (from 0) has to be ascending numbers");
+    refuse_placed(&none, &here, "part 0");
+    refuse_placed(&far, &here, "part 0");
+    refuse_placed(&same, &here, "part 0");
+    placement.part = 1;
+    refuse_placed(&all, &placement, "placement 0 (from 0) is of a part that there is not");
+    placement = here;
+    placement.rotation[0] = 2.0;
+    refuse_placed(&all, &placement, "is no rotation and translation");
+    placement = here;
+    placement.translation[1] = NAN;
+    refuse_placed(&all, &placement, "beyond 1e6 angstrom");
+    assert_int_equal(
+        ovoid_molecule_create_placed(context, two_atoms, 2, NULL, 0, &here, 0, &molecule),
+        OVOID_ERROR_EMPTY);
+    assert_null(molecule);
+}
+
 static void noise_gives_atoms_or_a_message(void **state) {
     (void)state;
     static const char xyzr[] = "2\n17.047 14.099 3.625 1.70\n16.967 12.784 4.338 2.00 1 CA\n";
@@ -1163,6 +1232,8 @@ int main(void) {
         cmocka_unit_test(standard_input_is_read),
         cmocka_unit_test(the_locale_does_not_matter),
         cmocka_unit_test(molecules_are_made_from_arrays),
+        cmocka_unit_test(assemblies_are_made_from_arrays),
+        cmocka_unit_test(assemblies_that_are_none_are_refused),
         cmocka_unit_test(noise_gives_atoms_or_a_message),
         cmocka_unit_test(apbs_examples_are_read),
         cmocka_unit_test(benchmark_molecules_are_read),

@@ -108,6 +108,13 @@ static void contexts_and_devices(void **state) {
     ANSWERS(NULL, ovoid_context_device_at, NULL, 0);
     ANSWERS(0, ovoid_context_device_count, NULL);
     ANSWERS(0, ovoid_context_count, NULL, OVOID_COUNT_LAUNCHES);
+    size_t many = 7;
+    ANSWERS(NULL, ovoid_context_tasks, NULL, &many);
+    assert_int_equal(many, 0);
+    many = 7;
+    ANSWERS(NULL, ovoid_context_rank_times, NULL, &many);
+    assert_int_equal(many, 0);
+    assert_null(ovoid_context_tasks(all.context, NULL)); /* no fit yet */
     REFUSED(ovoid_context_profile, context, NULL, true);
     REFUSED(ovoid_selftest, context, NULL, NULL, NULL, NULL, NULL);
     DOES_NOTHING(ovoid_selftest_options_init, NULL, sizeof(ovoid_selftest_options));
@@ -194,6 +201,16 @@ static void molecules(void **state) {
     KNOWN(residues, c, xyzr, &atom, NULL, &made);
     KNOWN(molecule, c, xyzr, &atom, &residue, NULL);
 #undef KNOWN
+    const ovoid_placement place = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const ovoid_unit_part part = {NULL, 1};
+#define PLACED(argument, c, x, p, q, out)                                                          \
+    REFUSED(ovoid_molecule_create_placed, argument, c, x, 1, p, 1, q, 1, out)
+    PLACED(context, NULL, xyzr, &part, &place, &made);
+    PLACED(xyzr, c, NULL, &part, &place, &made);
+    PLACED(parts, c, xyzr, NULL, &place, &made);
+    PLACED(placements, c, xyzr, &part, NULL, &made);
+    PLACED(molecule, c, xyzr, &part, &place, NULL);
+#undef PLACED
     REFUSED(ovoid_molecule_expand, context, NULL, all.molecule);
     REFUSED(ovoid_molecule_expand, molecule, c, NULL);
     ANSWERS(0, ovoid_molecule_atoms, NULL);

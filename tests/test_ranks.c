@@ -30,7 +30,7 @@ typedef struct rank {
     const ovoid_molecule *molecule;
     ovoid_fit_options options;
     pthread_t thread;
-    uint32_t fits;       /* parts that it has fitted */
+    atomic_uint fits;    /* parts that its workers have fitted */
     uint32_t fails_at;   /* its so many-th fit of a part fails; 0: none does */
     uint32_t stops_at;   /* or its progress callback stops from there on */
     bool fails_to_join;  /* its surveys */
@@ -40,13 +40,6 @@ typedef struct rank {
     ovoid_model *model;
     ovoid_fit_result result;
 } rank;
-
-static rank *rank_of(const ovoid_context *context, rank *ranks, size_t count) {
-    for (size_t n = 0; n < count; ++n)
-        if (ranks[n].context == context)
-            return &ranks[n];
-    return NULL;
-}
 
 static int gather(const void *mine, void *all, const uint64_t *sizes, void *user) {
     const rank *const r = user;
@@ -68,14 +61,26 @@ static int gather(const void *mine, void *all, const uint64_t *sizes, void *user
 
 static rank all_ranks[RANKS_MOST];
 
+/* NULL: one process fits. */
+static rank *rank_of(const ov_ranks *ranks) {
+    return ranks->exchange ? &all_ranks[ranks->exchange->rank] : NULL;
+}
+
+static rank *rank_with(const ovoid_context *context) {
+    for (size_t n = 0; n < RANKS_MOST; ++n)
+        if (all_ranks[n].context == context)
+            return &all_ranks[n];
+    return NULL;
+}
+
 ovoid_status __real_ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
                                       size_t done, ov_part_fit *fit);
 ovoid_status __wrap_ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
                                       size_t done, ov_part_fit *fit);
 ovoid_status __wrap_ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p,
                                       size_t done, ov_part_fit *fit) {
-    rank *const r = rank_of(context, all_ranks, RANKS_MOST);
-    if (r && ++r->fits == r->fails_at)
+    rank *const r = rank_of(parts->ranks);
+    if (r && atomic_fetch_add(&r->fits, 1) + 1 == r->fails_at)
         return ov_fail(context, OVOID_ERROR_NUMERIC, "made to fail");
     return __real_ov_part_fit_atoms(context, parts, p, done, fit);
 }
@@ -89,7 +94,7 @@ ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell 
 ovoid_status __wrap_ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
                                    size_t count, const ov_survey_images *images, double apart,
                                    ov_survey_total *total) {
-    const rank *const r = rank_of(context, all_ranks, RANKS_MOST);
+    const rank *const r = rank_with(context);
     if (r && r->fails_to_join)
         return ov_fail(context, OVOID_ERROR_NUMERIC, "made to fail behind the others' backs");
     return __real_ov_survey_join(context, cells, count, images, apart, total);
@@ -219,6 +224,54 @@ static void expect_models(const ovoid_model *model, const ovoid_fit_result *resu
     }
 }
 
+/* ---- what is told of the time ---------------------------------------------------------------- */
+
+/* Each part once, fitted after those that it waits for, by whom it says. */
+static void expect_tasks(const ovoid_context *context, uint32_t ranks, uint64_t parts) {
+    size_t count, fitted = 0, waiting = 0;
+    const ovoid_task *const task = ovoid_context_tasks(context, &count);
+    bool *const done = test_alloc(parts, sizeof *done);
+    for (size_t n = 0; n < count; ++n) {
+        assert_in_range(task[n].rank, 0, ranks - 1);
+        assert_true(task[n].began >= 0.0 && task[n].seconds > 0.0);
+        assert_true(n == 0 || task[n].stage >= task[n - 1].stage);
+        if (task[n].kind != OVOID_TASK_FIT)
+            continue;
+        assert_in_range(task[n].number, 0, parts - 1);
+        assert_false(done[task[n].number]);
+        for (uint64_t k = 0; k < task[n].after_count && ranks > 1; ++k)
+            assert_true(done[task[n].after[k]]);
+        waiting += task[n].after_count > 0;
+        done[task[n].number] = true;
+        ++fitted;
+    }
+    assert_int_equal(fitted, parts);
+    assert_true(waiting > 0);
+    free(done);
+}
+
+/* Workers are busy or wait, and no longer than the fit takes. */
+static void expect_times(const ovoid_context *context, uint32_t ranks, uint64_t fits) {
+    size_t count, tasks, of_all = 0, of_parts = 0;
+    const ovoid_task *const task = ovoid_context_tasks(context, &tasks);
+    const ovoid_rank_time *const time = ovoid_context_rank_times(context, &count);
+    assert_int_equal(count, ranks);
+    for (uint32_t n = 0; n < ranks; ++n) {
+        double busy = 0.0;
+        assert_int_equal(time[n].rank, n);
+        assert_int_equal(time[n].workers, 1);
+        for (size_t k = 0; k < tasks; ++k)
+            busy += task[k].rank == n ? task[k].seconds : 0.0;
+        assert_true(fabs(busy - time[n].busy) < 1e-9);
+        assert_true(busy + time[n].waiting < 1.02 * time[n].seconds + 0.05);
+        of_all += (size_t)time[n].tasks;
+    }
+    for (size_t k = 0; k < tasks; ++k)
+        of_parts += task[k].kind == OVOID_TASK_FIT;
+    assert_int_equal(of_all, tasks);
+    assert_int_equal(of_parts, fits);
+}
+
 /* ---- one model ------------------------------------------------------------------------------- */
 
 /* The bits of one process, each part fitted by one rank alone, and none idle. */
@@ -230,12 +283,16 @@ static void all_ranks_come_to_the_model_of_one(void **state) {
     test_skip_simulated(*state);
     ovoid_fit_result_init(&result, sizeof result);
     test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    expect_tasks(*state, 1, result.parts);
+    expect_times(*state, 1, result.parts);
     for (uint32_t ranks = 1; ranks <= RANKS_MOST; ++ranks) {
         gather_ranks(ranks, molecule, &options);
         run_ranks();
         expect_models(model, &result);
         assert_int_equal(all_fits(), result.parts);
         for (uint32_t n = 0; n < ranks; ++n) {
+            expect_tasks(all_ranks[n].context, ranks, result.parts);
+            expect_times(all_ranks[n].context, ranks, result.parts);
             assert_in_range(all_ranks[n].fits, result.parts / ranks / 2, result.parts);
             assert_in_range(all_ranks[n].done, result.parts / 2, result.parts);
         }
@@ -300,6 +357,20 @@ static ovoid_molecule *pair(ovoid_context *context) {
     return molecule;
 }
 
+/* The same made of its unit and placements, as one rank sends them to another. */
+static ovoid_molecule *placed_again(ovoid_context *context, const ovoid_molecule *from) {
+    ovoid_molecule *molecule = NULL;
+    ovoid_unit_part part;
+    size_t count;
+    const ovoid_placement *const placed = ovoid_molecule_placements(from, &count);
+    const double *const xyzr = ovoid_molecule_unit_xyzr(from);
+    const size_t atoms = ovoid_molecule_unit_atoms(from);
+    part.atoms = ovoid_molecule_part(from, 0, &part.count);
+    test_check(context, ovoid_molecule_create_placed(context, xyzr, atoms, &part, 1, placed, count,
+                                                     &molecule));
+    return molecule;
+}
+
 /* One unit of an assembly is fitted for all, and its pieces go on in images of it. */
 static void units_are_those_of_one(void **state) {
     ovoid_molecule *molecule = pair(*state);
@@ -311,7 +382,9 @@ static void units_are_those_of_one(void **state) {
     test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
     assert_int_equal(result.units, 2);
     assert_in_range(result.parts, 3, 8);
+    ovoid_molecule *again = placed_again(*state, molecule);
     gather_ranks(2, molecule, &options);
+    all_ranks[1].molecule = again;
     run_ranks();
     expect_models(model, &result);
     assert_int_equal(all_ranks[1].result.units, 2);
@@ -322,6 +395,7 @@ static void units_are_those_of_one(void **state) {
     expect_all(OVOID_ERROR_ARGUMENT, "rank 1 has other");
     dismiss_ranks();
     ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&again);
     ovoid_molecule_destroy(&molecule);
 }
 
@@ -352,6 +426,8 @@ static void one_part_is_fitted_by_each(void **state) {
     test_skip_simulated(*state);
     ovoid_fit_result_init(&result, sizeof result);
     test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
+    assert_null(ovoid_context_tasks(*state, NULL)); /* those of the fit before are forgotten */
+    assert_null(ovoid_context_rank_times(*state, NULL));
     gather_ranks(2, molecule, &options);
     run_ranks();
     expect_models(model, &result);

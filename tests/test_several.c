@@ -99,7 +99,7 @@ static ovoid_status perform(play *p, ovoid_context *context, size_t parts, size_
         p->part_of[n].colour = n % 4 == 3;
         p->on[n] = NOBODY;
     }
-    const ovoid_status status = ov_parts_work(context, &cut, jobs, &work);
+    const ovoid_status status = ov_parts_work(context, &cut, jobs, &work, NULL);
     pthread_cond_destroy(&p->changed);
     pthread_mutex_destroy(&p->lock);
     return status;
@@ -344,6 +344,7 @@ static void a_lost_device_changes_no_bits(void **state) {
                  {1, 2, CL_OUT_OF_RESOURCES},
                  {2, 2, CL_MEM_OBJECT_ALLOCATION_FAILURE},
                  {1, 200, -9999},
+                 {2, 200, CL_MEM_OBJECT_ALLOCATION_FAILURE},
                  {2, 300, CL_OUT_OF_RESOURCES}};
     case_of c;
     (void)state;

@@ -61,6 +61,8 @@ void ovoid_context_destroy(ovoid_context **context) {
     ov_tenants_release(*context);
     if ((*context)->close_device)
         (*context)->close_device(*context);
+    if ((*context)->drop_times)
+        (*context)->drop_times(*context);
     drop_error(*context);
     free(*context);
     *context = NULL;

@@ -24,6 +24,8 @@ struct ovoid_context {
     unsigned works;                        /* public functions at work, one within the other */
     struct ov_tenant *tenants;             /* base/tenant.h */
     struct ov_crew *crew;                  /* workers of a fit in parts (fit/parts/crew.h) */
+    struct ov_times *times;                /* of the last one (fit/parts/times.h) */
+    void (*drop_times)(ovoid_context *);   /* set by the room that keeps them */
     bool profile;                          /* devices begin with their launches counted */
     struct ov_device *device;              /* NULL until opened */
     void (*close_device)(ovoid_context *); /* set by the room that opens it; base knows no OpenCL */

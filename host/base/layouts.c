@@ -57,6 +57,12 @@ PROMISED(ovoid_l1_progress, 7 * sizeof(double));
 PROMISED(ovoid_adaptive_progress, sizeof(double));
 PROMISED(ovoid_l1_result, 72);
 PROMISED(ovoid_adaptive_result, 8);
+PROMISED(ovoid_task, 48 + sizeof(void *));
+AT(ovoid_task, began, 24);
+AT(ovoid_task, after, 48);
+PROMISED(ovoid_rank_time, 40);
+AT(ovoid_rank_time, tasks, 32);
+PROMISED(ovoid_unit_part, 2 * sizeof(void *));
 PROMISED(ovoid_kernel_time, sizeof(const char *) + 16);
 
 /* Structures that grow begin with their size. */
@@ -81,18 +87,43 @@ AT(ovoid_selftest_result, size, 0);
 static const struct {
     const char *type;
     size_t size;
-} sizes[] = {SIZE(ovoid_l1_progress),   SIZE(ovoid_adaptive_progress), SIZE(ovoid_progress),
-             SIZE(ovoid_device_info),   SIZE(ovoid_kernel_time),       SIZE(ovoid_export_options),
-             SIZE(ovoid_l1_options),    SIZE(ovoid_adaptive_options),  SIZE(ovoid_fit_options),
-             SIZE(ovoid_l1_result),     SIZE(ovoid_adaptive_result),   SIZE(ovoid_fit_result),
-             SIZE(ovoid_pair),          SIZE(ovoid_measure_options),   SIZE(ovoid_measures),
-             SIZE(ovoid_mesh_options),  SIZE(ovoid_component),         SIZE(ovoid_distances),
-             SIZE(ovoid_ellipsoid),     SIZE(ovoid_read_options),      SIZE(ovoid_molecule_counts),
-             SIZE(ovoid_atom),          SIZE(ovoid_residue),           SIZE(ovoid_guess),
-             SIZE(ovoid_assembly_info), SIZE(ovoid_placement),         SIZE(ovoid_picture_options),
-             SIZE(ovoid_check),         SIZE(ovoid_selftest_options),  SIZE(ovoid_selftest_result),
-             SIZE(ovoid_scene),         SIZE(ovoid_parts_options),     SIZE(ovoid_exchange),
-             SIZE(ovoid_motion)};
+} sizes[] = {SIZE(ovoid_l1_progress),
+             SIZE(ovoid_adaptive_progress),
+             SIZE(ovoid_progress),
+             SIZE(ovoid_device_info),
+             SIZE(ovoid_kernel_time),
+             SIZE(ovoid_export_options),
+             SIZE(ovoid_l1_options),
+             SIZE(ovoid_adaptive_options),
+             SIZE(ovoid_fit_options),
+             SIZE(ovoid_l1_result),
+             SIZE(ovoid_adaptive_result),
+             SIZE(ovoid_fit_result),
+             SIZE(ovoid_pair),
+             SIZE(ovoid_measure_options),
+             SIZE(ovoid_measures),
+             SIZE(ovoid_mesh_options),
+             SIZE(ovoid_component),
+             SIZE(ovoid_distances),
+             SIZE(ovoid_ellipsoid),
+             SIZE(ovoid_read_options),
+             SIZE(ovoid_molecule_counts),
+             SIZE(ovoid_atom),
+             SIZE(ovoid_residue),
+             SIZE(ovoid_guess),
+             SIZE(ovoid_assembly_info),
+             SIZE(ovoid_placement),
+             SIZE(ovoid_picture_options),
+             SIZE(ovoid_check),
+             SIZE(ovoid_selftest_options),
+             SIZE(ovoid_selftest_result),
+             SIZE(ovoid_scene),
+             SIZE(ovoid_parts_options),
+             SIZE(ovoid_exchange),
+             SIZE(ovoid_motion),
+             SIZE(ovoid_task),
+             SIZE(ovoid_rank_time),
+             SIZE(ovoid_unit_part)};
 #undef SIZE
 
 size_t ovoid_sizeof(const char *type) {

@@ -121,15 +121,12 @@ static bool is_shared(const fit_job *job) {
     return false;
 }
 
-/* Ranks get atoms, and not what places them. */
-static void leave_symmetry(fit_job *job) {
-    ovoid_parts_options *const parts = &job->options.parts;
-    if (!ovoid_molecule_placements(job->molecule, NULL) || parts->symmetry != OVOID_SYMMETRY_USE)
-        return;
-    parts->symmetry = OVOID_SYMMETRY_IGNORE;
-    if (!job->quiet)
-        cli_warning("ranks share all atoms of an assembly, as with --no-symmetry; one process may "
-                    "be faster, if it is symmetric");
+/* Of a symmetric assembly it takes the fit to know how many parts one unit has. */
+static void compare_parts(const fit_job *job, const ovoid_fit_result *result) {
+    if (result->parts < ranks_count() && !job->quiet)
+        cli_warning("%llu part%s cannot keep %u ranks busy: --part-atoms makes more of them",
+                    (unsigned long long)result->parts, result->parts == 1 ? "" : "s",
+                    (unsigned)ranks_count());
 }
 
 static ovoid_status reach(fit_job *job, const ovoid_fit_options *options, fit_level *now) {
@@ -142,6 +139,8 @@ static ovoid_status reach(fit_job *job, const ovoid_fit_options *options, fit_le
                     limit > 0.0 ? fmax(left, 1e-3) : 0.0, &now->model, &now->result);
     if (status == OVOID_ERROR_CANCELLED && limit > 0.0 && cli_seconds() - job->fit_began >= limit)
         job->out_of_time = true; /* another rank has seen it first */
+    if (status == OVOID_OK && now == job->levels)
+        compare_parts(job, &now->result);
     return status;
 }
 
@@ -162,6 +161,8 @@ static ovoid_status fit_model(fit_job *job, size_t level) {
     }
     ovoid_context_on_progress(job->context, on_progress, job);
     ovoid_status status = reach(job, &options, now);
+    if (level == 0 && !fit_work_take(&job->work, job->context, job->profile.wanted))
+        return OVOID_ERROR_MEMORY;
     ovoid_context_on_progress(job->context, cli_on_progress, NULL);
     if (status == OVOID_ERROR_CANCELLED && now->model && job->out_of_time && !cli_interrupted()) {
         now->stopped = true;
@@ -428,8 +429,6 @@ int fit_run(fit_job *job) {
     if (!ovoid_context_device(job->context) && (status = open_device(job)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     job->shared = is_shared(job);
-    if (job->shared)
-        leave_symmetry(job);
     if (job->shared && !ranks_open(job->asked_device, &levels))
         return levels;
     status = run_fit(job, &levels, &measured);
@@ -458,6 +457,7 @@ void fit_job_destroy(fit_job *job) {
     for (size_t i = 0; i < FIT_LEVELS_MAX; i++)
         ovoid_model_destroy(&job->levels[i].model);
     cli_profile_destroy(&job->profile);
+    fit_work_destroy(&job->work);
     ovoid_molecule_destroy(&job->molecule);
     fit_outputs_destroy(job);
 }

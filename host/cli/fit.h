@@ -38,6 +38,20 @@ typedef struct fit_session {
     int32_t model;            /* number of the last one that was fitted, 0: none was */
 } fit_session;
 
+/* All tasks of a kind. */
+typedef struct fit_task_kind {
+    uint64_t count;
+    double seconds, longest;
+} fit_task_kind;
+
+/* Where the time of a fit in parts went. {0}: it was fitted as a whole, or not yet. */
+typedef struct fit_work {
+    ovoid_rank_time *rank; /* owned */
+    size_t ranks;
+    fit_task_kind kinds[3]; /* by ovoid_task_kind */
+    cJSON *tasks;           /* one by one, where a profile is wanted; owned */
+} fit_work;
+
 typedef struct fit_job {
     /* what was asked */
     const char *input;
@@ -73,6 +87,7 @@ typedef struct fit_job {
     ovoid_fitter *fitter;             /* during the fits; with a session until that takes it */
     int32_t moved_from;               /* model that the session began with; 0: with the atoms */
     bool out_of_time;                 /* the time limit ended them */
+    fit_work work;                    /* of the first level, where it was fitted in parts */
     bool shared;                      /* other ranks take part in the fits */
     fit_level levels[FIT_LEVELS_MAX]; /* all have their paths from the start */
     size_t levels_done; /* have their models; fewer than asked for where halving ends */
@@ -179,6 +194,21 @@ void fit_summary_after(const fit_job *job);
 /* What is known for programs, as JSON to be deleted; NULL without memory. The models are there. */
 cJSON *fit_report_make(const fit_job *job);
 ovoid_status fit_report_write(const fit_job *job);
+
+/* ---- work.c ---------------------------------------------------------------------------------- */
+
+/* Takes what the context's last fit in parts tells of its ranks, and of its tasks where a profile
+ * is wanted. False: no memory. */
+bool fit_work_take(fit_work *work, const ovoid_context *context, bool profile);
+void fit_work_destroy(fit_work *work);
+
+/* A line of what the ranks' time went into, where there was more than one worker; for a profile a
+ * table. Nothing where no parts were fitted. */
+void fit_work_print(const fit_work *work, FILE *out);
+void fit_work_print_table(const fit_work *work, FILE *out);
+
+/* The same as `work`: an object with `ranks` and, for a profile, `tasks`. */
+bool fit_work_report(const fit_work *work, cJSON *report);
 
 /* ---- fit_batch.c, fit_batch_names.c, fit_batch_summary.c --------------------------------------
  */

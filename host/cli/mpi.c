@@ -1,6 +1,7 @@
 #include "mpi.h"
 
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 #include <mpi.h>
@@ -9,6 +10,7 @@
 static const size_t most = (size_t)1 << 30;
 
 static bool running;
+static int *counts; /* of a gather: of each rank its bytes, then where they begin */
 
 /* Open MPI's mpirun, PMIx (also of Slurm), PMI (MPICH, Slurm). MPI without a launcher would start a
  * daemon of its own for one rank. */
@@ -41,6 +43,9 @@ void mpi_begin(int *argc, char ***argv, mpi_place *place) {
     MPI_Comm_size(MPI_COMM_WORLD, &ranks);
     running = true;
     *place = (mpi_place){.rank = (uint32_t)rank, .ranks = (uint32_t)ranks};
+    counts = calloc((size_t)ranks, 2 * sizeof *counts);
+    if (!counts)
+        mpi_abort(EXIT_FAILURE);
     look_around(place);
 }
 
@@ -48,6 +53,8 @@ void mpi_end(void) {
     if (running)
         MPI_Finalize();
     running = false;
+    free(counts);
+    counts = NULL;
 }
 
 _Noreturn void mpi_abort(int code) {
@@ -79,5 +86,34 @@ void mpi_share(void *bytes, size_t count, uint32_t from) {
         await(&request);
         at += now;
         count -= now;
+    }
+}
+
+/* Whether they are few enough for one call, on all ranks alike. */
+static bool count_bytes(const uint64_t *sizes, uint32_t ranks) {
+    size_t sum = 0;
+    for (uint32_t n = 0; n < ranks; n++) {
+        if (sizes[n] > most - sum)
+            return false;
+        counts[n] = (int)sizes[n];
+        counts[ranks + n] = (int)sum;
+        sum += (size_t)sizes[n];
+    }
+    return true;
+}
+
+void mpi_gather(const void *mine, void *all, const uint64_t *sizes, const mpi_place *place) {
+    unsigned char *at = all;
+    if (count_bytes(sizes, place->ranks)) {
+        MPI_Request request;
+        MPI_Iallgatherv(mine, counts[place->rank], MPI_BYTE, all, counts, counts + place->ranks,
+                        MPI_BYTE, MPI_COMM_WORLD, &request);
+        await(&request);
+        return;
+    }
+    for (uint32_t rank = 0; rank < place->ranks; at += sizes[rank++]) {
+        if (rank == place->rank && sizes[rank] > 0)
+            memcpy(at, mine, (size_t)sizes[rank]);
+        mpi_share(at, (size_t)sizes[rank], rank);
     }
 }

@@ -20,6 +20,9 @@ void mpi_end(void);
 /* Those of rank `from`, in place. Waits without taking a core's time. */
 void mpi_share(void *bytes, size_t count, uint32_t from);
 
+/* Gives all ranks the bytes of each, sizes[rank] of them, one after the other. Waits likewise. */
+void mpi_gather(const void *mine, void *all, const uint64_t *sizes, const mpi_place *place);
+
 /* Ends all ranks at once. */
 _Noreturn void mpi_abort(int code);
 

@@ -54,7 +54,7 @@ void cli_profile_print(const cli_profile *profile, const char *whole, FILE *out)
         sum += kernel->seconds;
     }
     fprintf(out, "%-16s  %10s", "all else", "-");
-    print_time(profile, profile->seconds - sum, out);
+    print_time(profile, sum > profile->seconds ? NAN : profile->seconds - sum, out);
     fprintf(out, "%-16s  %10llu", whole, launches);
     print_time(profile, profile->seconds, out);
     const uint64_t *const n = profile->counts;

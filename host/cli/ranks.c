@@ -17,10 +17,14 @@ typedef struct order {
     enum { END, OPEN, FIT } what;
     char device[TEXT]; /* to open */
     ovoid_fit_options options;
-    bool keeps;     /* rank 0 has a checkpoint */
-    double seconds; /* to stop after; 0: never */
-    uint64_t atoms;
+    bool keeps;                 /* rank 0 has a checkpoint */
+    double seconds;             /* to stop after; 0: never */
+    uint64_t atoms;             /* of an assembly, of its unit */
+    uint64_t parts, placements; /* of an assembly; 0: it is none */
 } order;
+
+/* Beside the number of atoms of a part: they are all of the unit. */
+#define WHOLE_UNIT ((uint64_t)1 << 63)
 
 static void give_order(const order *o) {
     order copy = *o;
@@ -35,14 +39,9 @@ uint32_t ranks_count(void) {
 
 /* An ovoid_exchange's. */
 static int gather(const void *mine, void *all, const uint64_t *sizes, void *user) {
-    unsigned char *at = all;
     (void)user;
     ++gathers;
-    for (uint32_t rank = 0; rank < place.ranks; at += sizes[rank++]) {
-        if (rank == place.rank && sizes[rank] > 0)
-            memcpy(at, mine, (size_t)sizes[rank]);
-        mpi_share(at, (size_t)sizes[rank], rank);
-    }
+    mpi_gather(mine, all, sizes, &place);
     return 0;
 }
 
@@ -188,21 +187,52 @@ static void open_device(const order *o) {
     say_opened(&mine, &rank, &first);
 }
 
-/* The atoms of rank 0's molecule. */
-static ovoid_molecule *receive(const order *o) {
-    ovoid_molecule *molecule = NULL;
-    double *const xyzr = o->atoms > SIZE_MAX / (4 * sizeof *xyzr)
-                             ? NULL
-                             : malloc(4 * (size_t)o->atoms * sizeof *xyzr);
-    if (!xyzr) {
-        cli_error("out of memory for %llu atoms", (unsigned long long)o->atoms);
+/* So many bytes of rank 0, to be freed. */
+static void *receive(uint64_t count, size_t size) {
+    void *const made = count > SIZE_MAX / size - 1 ? NULL : malloc((size_t)count * size + 1);
+    if (!made) {
+        cli_error("out of memory for what rank 0 sends (%llu times %zu bytes)",
+                  (unsigned long long)count, size);
         mpi_abort(CLI_COMPUTE);
     }
-    mpi_share(xyzr, 4 * (size_t)o->atoms * sizeof *xyzr, 0);
-    if (ovoid_molecule_create(hand, xyzr, (size_t)o->atoms, &molecule) != OVOID_OK) {
+    mpi_share(made, (size_t)count * size, 0);
+    return made;
+}
+
+/* Parts of the unit: how many atoms each has, then which; of the whole unit it does not say. */
+static ovoid_unit_part *receive_parts(const order *o) {
+    uint64_t *const counts = receive(o->parts, sizeof *counts);
+    ovoid_unit_part *const parts = calloc((size_t)o->parts + 1, sizeof *parts);
+    if (!parts)
+        mpi_abort(CLI_COMPUTE);
+    for (uint64_t p = 0; p < o->parts; p++) {
+        parts[p].count = (size_t)(counts[p] & ~WHOLE_UNIT);
+        if (!(counts[p] & WHOLE_UNIT))
+            parts[p].atoms = receive(parts[p].count, sizeof *parts->atoms);
+    }
+    free(counts);
+    return parts;
+}
+
+/* Rank 0's molecule: its atoms, or those of its unit and its placements. */
+static ovoid_molecule *receive_molecule(const order *o) {
+    ovoid_molecule *molecule = NULL;
+    double *const xyzr = receive(o->atoms, 4 * sizeof *xyzr);
+    ovoid_unit_part *const parts = receive_parts(o);
+    ovoid_placement *const placements = receive(o->placements, sizeof *placements);
+    const ovoid_status status =
+        o->placements > 0
+            ? ovoid_molecule_create_placed(hand, xyzr, (size_t)o->atoms, parts, (size_t)o->parts,
+                                           placements, (size_t)o->placements, &molecule)
+            : ovoid_molecule_create(hand, xyzr, (size_t)o->atoms, &molecule);
+    if (status != OVOID_OK) {
         cli_error("%s", ovoid_context_error(hand));
         mpi_abort(CLI_COMPUTE);
     }
+    for (uint64_t p = 0; p < o->parts; p++)
+        free((void *)(uintptr_t)parts[p].atoms);
+    free(parts);
+    free(placements);
     free(xyzr);
     return molecule;
 }
@@ -215,7 +245,7 @@ static void fit(const order *o) {
     ovoid_model *model = NULL;
     const uint64_t before = gathers;
     stop_at = o->seconds > 0.0 ? cli_seconds() + o->seconds : 0.0;
-    ovoid_molecule *molecule = receive(o);
+    ovoid_molecule *molecule = receive_molecule(o);
     options.parts.exchange = &with;
     options.parts.checkpoint = o->keeps ? rank_0s : NULL;
     check_met(hand, ovoid_fit(hand, molecule, &options, &model, NULL), before);
@@ -255,6 +285,54 @@ void ranks_end(void) {
     mpi_end();
 }
 
+/* How many parts the placements speak of. */
+static uint64_t parts_of(const ovoid_placement *placements, size_t count) {
+    uint64_t parts = 0;
+    for (size_t n = 0; n < count; n++)
+        parts = placements[n].part >= parts ? (uint64_t)placements[n].part + 1 : parts;
+    return parts;
+}
+
+/* MPI's own calls take what they only read as if they changed it. */
+static void send(const void *bytes, size_t count) {
+    mpi_share((void *)(uintptr_t)bytes, count, 0);
+}
+
+static void send_parts(const ovoid_molecule *molecule, uint64_t parts) {
+    for (uint64_t p = 0; p < parts; p++) {
+        size_t count;
+        const uint32_t *const atoms = ovoid_molecule_part(molecule, (uint32_t)p, &count);
+        if (atoms)
+            send(atoms, count * sizeof *atoms);
+    }
+}
+
+static void send_counts(const ovoid_molecule *molecule, uint64_t parts) {
+    uint64_t *const counts = calloc((size_t)parts + 1, sizeof *counts);
+    if (!counts)
+        mpi_abort(CLI_COMPUTE);
+    for (uint64_t p = 0; p < parts; p++) {
+        size_t count;
+        const bool whole = !ovoid_molecule_part(molecule, (uint32_t)p, &count);
+        counts[p] = count | (whole ? WHOLE_UNIT : 0);
+    }
+    send(counts, (size_t)parts * sizeof *counts);
+    free(counts);
+}
+
+static void send_molecule(const ovoid_molecule *molecule, order *o) {
+    size_t placements;
+    const ovoid_placement *const placed = ovoid_molecule_placements(molecule, &placements);
+    o->atoms = ovoid_molecule_unit_atoms(molecule);
+    o->placements = placements;
+    o->parts = parts_of(placed, placements);
+    give_order(o);
+    send(ovoid_molecule_unit_xyzr(molecule), 4 * (size_t)o->atoms * sizeof(double));
+    send_counts(molecule, o->parts);
+    send_parts(molecule, o->parts);
+    send(placed, placements * sizeof *placed);
+}
+
 ovoid_status ranks_reach(ovoid_context *context, ovoid_fitter *fitter,
                          const ovoid_molecule *molecule, const ovoid_fit_options *options,
                          double seconds, ovoid_model **model, ovoid_fit_result *result) {
@@ -264,12 +342,9 @@ ovoid_status ranks_reach(ovoid_context *context, ovoid_fitter *fitter,
     order o = {.what = FIT,
                .options = *options,
                .keeps = options->parts.checkpoint != NULL,
-               .seconds = seconds,
-               .atoms = ovoid_molecule_atoms(molecule)};
-    double *const xyzr = (double *)ovoid_molecule_xyzr(molecule); /* is read alone */
+               .seconds = seconds};
     o.options.parts.checkpoint = NULL;
-    give_order(&o);
-    mpi_share(xyzr, 4 * (size_t)o.atoms * sizeof *xyzr, 0);
+    send_molecule(molecule, &o);
     shared.parts.exchange = &with;
     const ovoid_status status = ovoid_fitter_reach(context, fitter, &shared, model, result);
     check_met(context, status, before);

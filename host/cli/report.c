@@ -208,6 +208,7 @@ cJSON *fit_report_make(const fit_job *job) {
     add_devices(&b, job->context);
     add_times(&b, job);
     add_profile(&b, job);
+    b.good = b.good && fit_work_report(&job->work, b.object);
     b.good = b.good && cli_profile_report(&job->profile, b.object);
     if (!b.good) {
         cJSON_Delete(b.object);

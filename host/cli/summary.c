@@ -122,6 +122,7 @@ void fit_summary_after(const fit_job *job) {
     putc('\n', out);
     const count atoms = ovoid_molecule_atoms(job->molecule);
     print_work(out, job);
+    fit_work_print(&job->work, out);
     print_stop(out, job);
     if (!l1)
         print_goal(out, job);
@@ -149,5 +150,7 @@ void fit_summary_after(const fit_job *job) {
         print_written(out, "trace", job->trace);
     if (job->owners && !job->owners_failed)
         print_written(out, "owners", job->owners);
+    if (job->profile.known)
+        fit_work_print_table(&job->work, out);
     cli_profile_print(&job->profile, "fit", out);
 }

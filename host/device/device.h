@@ -103,6 +103,11 @@ void ov_device_close(ovoid_context *context);
 void ov_device_counted(const ov_device *device, const uint64_t before[OVOID_COUNTS],
                        uint64_t counts[OVOID_COUNTS]);
 
+/* Adds what another context of the same process has counted at its device, and the times of its
+ * kernels, to what this one has. Nothing where either has no device. A failure is told to `from`.
+ */
+ovoid_status ov_device_absorb(ovoid_context *context, ovoid_context *from);
+
 /* A kernel. `name` and `program` are string constants. */
 typedef struct ov_kernel {
     cl_kernel handle;

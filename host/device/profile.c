@@ -170,6 +170,36 @@ ovoid_status ovoid_context_profile(ovoid_context *context, bool on) {
     return status;
 }
 
+static ovoid_status absorb_times(ovoid_context *context, ov_profile *to, const ov_profile *from) {
+    ovoid_status status = OVOID_OK;
+    for (size_t n = 0; n < from->count; ++n) {
+        const ovoid_kernel_time *const one = &from->kernels[n];
+        size_t k = 0;
+        while (k < to->count && strcmp(to->kernels[k].name, one->name) != 0)
+            ++k;
+        OV_TRY(
+            ov_grow(context, &to->kernels, &to->capacity, k + 1, sizeof *to->kernels, "a profile"));
+        if (k == to->count)
+            to->kernels[to->count++] = (ovoid_kernel_time){.name = one->name};
+        to->kernels[k].launches += one->launches;
+        to->kernels[k].seconds += one->seconds;
+    }
+cleanup:
+    return status;
+}
+
+ovoid_status ov_device_absorb(ovoid_context *context, ovoid_context *from) {
+    ov_device *const to = context->device, *const other = from->device;
+    if (!to || !other)
+        return OVOID_OK;
+    for (size_t n = 0; n < OVOID_COUNTS; ++n)
+        to->counts[n] += other->counts[n];
+    if (!to->profile || !to->profile->on || !other->profile)
+        return OVOID_OK;
+    const ovoid_status status = ov_profile_drain(from, other);
+    return status == OVOID_OK ? absorb_times(from, to->profile, other->profile) : status;
+}
+
 /* ---- times -------------------------------------------------------------------------------- */
 
 /* The longest first; of unknown times, the most launches. */

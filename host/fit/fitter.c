@@ -9,6 +9,7 @@
 #include "fit/motion.h"
 #include "fit/options.h"
 #include "fit/parts/parts.h"
+#include "fit/parts/times.h"
 #include "model/factor.h"
 #include "model/model.h"
 #include "model/owner.h"
@@ -299,6 +300,7 @@ static ovoid_status fit(ovoid_fitter *fitter, const ovoid_fit_options *options, 
     ovoid_status status = OVOID_OK;
     ov_device *device;
     ov_ranks ranks = {0};
+    ov_times_forget(fitter->context);
     if (options->method == OVOID_METHOD_ADAPTIVE)
         OV_TRY(meet_ranks(fitter, options, &ranks));
     OV_TRY(ov_fit_options_check(fitter->context, options));

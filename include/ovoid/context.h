@@ -214,10 +214,11 @@ typedef struct ovoid_kernel_time { /* 24 bytes */
                        tell them all */
 } ovoid_kernel_time;
 
-/* Counts and times each kernel launched from now on, on the opened device and on those opened later
- * (true), or no longer (false, as it is at first). May be called at any time: waits for what is
- * under way. true begins with no kernels, and so does opening a device; after false the times can
- * still be had. Results do not change, and without it nothing is spent on it. */
+/* Counts and times each kernel launched from now on, on the opened device, on those opened later
+ * and by the workers of fits in parts (true), or no longer (false, as it is at first). May be
+ * called at any time: waits for what is under way. true begins with no kernels, and so does opening
+ * a device; after false the times can still be had. Results do not change, and without it nothing
+ * is spent on it. */
 OVOID_API ovoid_status ovoid_context_profile(ovoid_context *context, bool on);
 
 /* What was counted, the longest first: *times is an array of *count entries to be freed with
@@ -238,7 +239,8 @@ typedef enum ovoid_count {
     OVOID_COUNTS                   /* how many of them there are */
 } ovoid_count;
 
-/* How much of it there was since the device was opened; 0 before one is opened. Counting is always
+/* How much of it there was since the device was opened, by the workers of fits in parts as well,
+ * once these end; 0 before one is opened. Counting is always
  * on and takes no time. */
 OVOID_API uint64_t ovoid_context_count(const ovoid_context *context, ovoid_count what);
 

@@ -99,8 +99,8 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
  * beginning, and refused on all of them (OVOID_ERROR_ARGUMENT) with what it is; only unequal
  * devices are no more than a warning on rank 0, for they may come to other last bits. What one rank
  * meets, an error or a progress callback that stops, ends the fit on all of them with its status
- * and its text, which names the rank, when next they exchange: at the latest when each has done the
- * parts that it is at. What is not fitted in parts each rank fits by itself, to the same model. */
+ * and its text, which names the rank, when next they exchange: every few milliseconds while their
+ * workers are at parts. What is not fitted in parts each rank fits by itself, to the same model. */
 typedef struct ovoid_exchange { /* 24 bytes */
     uint32_t rank, ranks;       /* of this process, from 0, and how many there are */
     /* Gives all ranks the bytes of all. `mine` has sizes[rank] of them, and `all` gets those of
@@ -108,8 +108,10 @@ typedef struct ovoid_exchange { /* 24 bytes */
      * room for. `sizes`, one for each rank, are the same on all of them, and a size may be 0. All
      * arrays are the library's, and are theirs until it returns. Every rank calls it equally often
      * and in the same order, on the thread that called the library; it returns when the bytes are
-     * there, however long the other ranks take. Not 0: they cannot be exchanged any more; the fit
-     * then ends on this rank with OVOID_ERROR_IO, without another call. */
+     * there, however long the other ranks take. It is called some hundred times a second, mostly
+     * with 8 bytes of each rank, and waits best without taking a core from the workers. Not 0: they
+     * cannot be exchanged any more; the fit then ends on this rank with OVOID_ERROR_IO, without
+     * another call. */
     int (*gather)(const void *mine, void *all, const uint64_t *sizes, void *user);
     void *user;
 } ovoid_exchange;
@@ -237,6 +239,48 @@ OVOID_API void ovoid_fit_options_init(ovoid_fit_options *options, size_t size);
 OVOID_API ovoid_status ovoid_fit(ovoid_context *context, const ovoid_molecule *molecule,
                                  const ovoid_fit_options *options, ovoid_model **model,
                                  ovoid_fit_result *result);
+
+/* ---- where the time of a fit in parts went --------------------------------------------------- */
+
+/* What a part takes, one after the other. */
+typedef enum ovoid_task_kind {
+    OVOID_TASK_FIT = 0, /* a part is fitted */
+    OVOID_TASK_JUDGE,   /* its cell is judged: how far the surfaces are apart there */
+    OVOID_TASK_MEND     /* a patch is fitted about spots where they are too far apart */
+} ovoid_task_kind;
+
+/* One task that was done. Those of one stage wait for each other at most as `after` says; a stage
+ * begins when the one before is done. */
+typedef struct ovoid_task { /* 56 bytes on 64-bit machines */
+    ovoid_task_kind kind;
+    uint32_t stage;        /* from 0, in the order of time */
+    uint32_t number;       /* of the part or patch, from 0; of parts in the order of the model */
+    uint32_t rank;         /* that did it, 0 where one process fits */
+    uint32_t worker;       /* of this rank, from 0 */
+    uint32_t atoms;        /* of the part; 0 of a patch */
+    double began;          /* seconds since parts were begun with, by the clock of the rank */
+    double seconds;        /* that it took */
+    uint64_t after_count;  /* tasks of the stage that had to be done before this one began: */
+    const uint32_t *after; /* their numbers */
+} ovoid_task;
+
+/* What a rank did meanwhile. seconds * workers is busy + waiting + what is done between stages,
+ * which all ranks do alike. */
+typedef struct ovoid_rank_time { /* 40 bytes */
+    uint32_t rank;
+    uint32_t workers; /* at most */
+    double seconds;   /* from the first stage to the end of the last one */
+    double busy;      /* of all its workers, with tasks, s */
+    double waiting;   /* of all its workers, for tasks that they could begin, s */
+    uint64_t tasks;
+} ovoid_rank_time;
+
+/* The tasks of the context's last fit in parts, as far as it came, in the order in which they were
+ * done, and the times of all ranks, as rank 0 and the others know them. NULL and 0 where there was
+ * none. They belong to the context, until its next fit. */
+OVOID_API const ovoid_task *ovoid_context_tasks(const ovoid_context *context, size_t *count);
+OVOID_API const ovoid_rank_time *ovoid_context_rank_times(const ovoid_context *context,
+                                                          size_t *count);
 
 #ifdef __cplusplus
 }

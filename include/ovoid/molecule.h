@@ -229,6 +229,24 @@ OVOID_API const ovoid_placement *ovoid_molecule_placements(const ovoid_molecule 
 OVOID_API const uint32_t *ovoid_molecule_part(const ovoid_molecule *molecule, uint32_t part,
                                               size_t *count);
 
+/* Atoms of a unit that some placements take. */
+typedef struct ovoid_unit_part { /* 16 bytes on 64-bit machines */
+    const uint32_t *atoms;       /* their numbers, ascending; NULL: all */
+    size_t count;                /* of them */
+} ovoid_unit_part;
+
+/* As ovoid_molecule_create(), of an assembly: xyzr has the atoms of the unit, parts those that
+ * placements take of it, which say by number which part; without parts there is one, of all atoms.
+ * `first` of the placements is not read. A placement that is no rotation and translation, or takes
+ * atoms beyond 1e6 angstrom, and a part of atoms that there are not are OVOID_ERROR_ARGUMENT. All
+ * arrays are copied. */
+OVOID_API ovoid_status ovoid_molecule_create_placed(ovoid_context *context, const double *xyzr,
+                                                    size_t atoms, const ovoid_unit_part *parts,
+                                                    size_t part_count,
+                                                    const ovoid_placement *placements,
+                                                    size_t placement_count,
+                                                    ovoid_molecule **molecule);
+
 /* The unit: its atoms as the file has them. Of a molecule that is no assembly, all of it. */
 OVOID_API size_t ovoid_molecule_unit_atoms(const ovoid_molecule *molecule);
 OVOID_API const double *ovoid_molecule_unit_xyzr(const ovoid_molecule *molecule);

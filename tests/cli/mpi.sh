@@ -23,17 +23,59 @@ for n in 1 2 3 4; do
     expect_silent
     once "32 parts" "$out"
     [ $n = 1 ] || once ", $n ranks" "$out"
+    [ $n = 1 ] || once "work      $n workers of $n ranks: busy " "$out"
     cmp -s one.ovoid ranks.ovoid || fail "$n ranks should make the model that one process makes"
     rm ranks.ovoid
 done
 make_helix 130 b.xyzr # within a tolerance, in levels, by several workers; measured at the end
 run "$OVOID" fit b.xyzr -o b.ovoid --part-atoms 64 --tolerance 1 --levels 2 -q
 expect_code 0
-ranks 2 fit b.xyzr -o c.ovoid --part-atoms 64 --tolerance 1 --levels 2 --jobs 2 --report r.json
+ranks 2 fit b.xyzr -o c.ovoid --part-atoms 64 --tolerance 1 --levels 2 --jobs 2 --report r.json --profile
 expect_code 0
+once "work      4 workers of 2 ranks: busy " "$out"
+once "rank              workers" "$out"
+[ "$(grep -c '"share_waiting"' r.json)" -eq 2 ] || fail "both ranks should be in the report"
+[ "$(grep -c '"kind":.*"fit"' r.json)" -eq 4 ] || fail "all parts should be in the report, as tasks"
+grep -q '^field  *[1-9]' "$out" || fail "kernels of a rank's workers should be counted"
 cmp -s b.ovoid c.ovoid || fail "two ranks should make the model that one process makes"
 cmp -s b.level2.ovoid c.level2.ovoid || fail "the second level should be the same, too"
 rm [bc].*ovoid r.json
+
+# A symmetric assembly: by its unit, as one process does, and all atoms where that is asked for.
+awk 'BEGIN { print "REMARK 350 BIOMOLECULE: 1\nREMARK 350 APPLY THE FOLLOWING TO CHAINS: A"
+    for (p = 1; p <= 2; p++) for (k = 1; k <= 3; k++)
+        printf "REMARK 350   BIOMT%d %3d %9.6f %9.6f %9.6f %14.5f\n", k, p, k == 1 ? 3 - 2 * p : 0, k == 2 ? 3 - 2 * p : 0, k == 3, 0
+    for (i = 1; i <= 160; i++)
+        printf "ATOM  %5d  C   ALA A %3d    %8.3f %8.3f %8.3f %6.3f %6.3f\n", i, i / 8 + 1, 4 + 1.5 * cos(i), 1.5 * sin(i), 0.5 * i, 0, 1.5 }' >s.pqr
+symmetric="s.pqr --assembly 1 --ratio 0.1 --part-atoms 64 --no-measure"
+run "$OVOID" fit $symmetric -o s1.ovoid
+expect_code 0
+expect_out "4 parts, one of 2 units"
+ranks 3 fit $symmetric -o s3.ovoid
+expect_code 0
+expect_silent
+once "4 parts, one of 2 units, 3 ranks" "$out"
+cmp -s s1.ovoid s3.ovoid || fail "three ranks should make the model of the unit that one process makes"
+run "$OVOID" fit $symmetric -o s1.ovoid --no-symmetry -q
+expect_code 0
+ranks 2 fit $symmetric -o s3.ovoid --no-symmetry -q
+expect_code 0
+cmp -s s1.ovoid s3.ovoid || fail "two ranks should make the model of all atoms that one process makes"
+ranks 2 fit s.pqr --assembly 1 --ratio 0.1 --part-atoms 200 -o s3.ovoid --no-measure
+expect_code 0
+once "1 part cannot keep 2 ranks busy" "$err"
+rm s.pqr s1.ovoid s3.ovoid
+
+# Devices that come to other bits, here by other shapes of kernels: the same model whoever is faster, and a warning.
+for name in u1 u2; do
+    run timeout 300 mpirun -n 1 "$OVOID" fit a.xyzr $parts -o $name.ovoid : \
+        -n 1 -x OVOID_SHAPE=4x1 "$OVOID" fit a.xyzr $parts -o $name.ovoid
+    expect_code 0
+    once "the ranks have different devices or drivers" "$err"
+done
+cmp -s u1.ovoid u2.ovoid || fail "ranks of different devices should make the same model again"
+cmp -s one.ovoid u1.ovoid && fail "other shapes were to come to other bits"
+rm u1.ovoid u2.ovoid
 
 # What cannot be shared rank 0 does alone.
 ranks 3 fit b.xyzr --tolerance 1 --no-measure

@@ -72,6 +72,25 @@ expect_code 0
 grep -q "all else" "$out" && fail "no table was asked for"
 grep -q '"kernels"' r.json && fail "no kernels were asked for"
 
+# Parts: who worked on them, and what workers of their own have launched.
+make_chain 200 b.xyzr
+run "$OVOID" fit b.xyzr --part-atoms 64 --ratio 0.05 --profile --report r.json --no-measure
+expect_code 0
+grep '^rank ' -A 1 "$out" | grep -q '^0  *1 ' || fail "a row of the one rank was expected"
+grep -q '^work ' "$out" && fail "one worker waits for nobody"
+launches=$(awk '/^fit  *[0-9]* .*100.0$/ { print $2 }' "$out")
+[ "$launches" -gt 100 ] || fail "kernels were expected"
+[ "$(grep -c '"kind":.*"fit"' r.json)" -eq 4 ] || fail "a task for each of four parts was expected"
+run "$OVOID" fit b.xyzr --part-atoms 64 --ratio 0.05 --jobs 2 --profile --report r.json --no-measure
+expect_code 0
+grep -q '^work      2 workers: busy ' "$out" || fail "two workers were expected"
+[ "$launches" = "$(awk '/^fit  *[0-9]* .*100.0$/ { print $2 }' "$out")" ] || fail "workers' kernels should be counted"
+run "$OVOID" fit b.xyzr --part-atoms 64 --ratio 0.05 --report r.json --no-measure
+expect_code 0
+grep -q '"tasks":' r.json || fail "what the rank did was expected"
+grep -q '"kind"' r.json && fail "no tasks were asked for"
+rm b.xyzr b.ovoid
+
 run "$OVOID" measure a.xyzr a.ovoid --isovalue 0.9,1 --profile --report m.json
 expect_code 0
 expect_silent

@@ -55,7 +55,26 @@ for place in 1 2; do
     [ "$(grep -c warning "$err")" -eq 1 ] || fail "one warning was expected"
     cmp -s one.ovoid lost.ovoid || fail "the device that is left should make the same model"
 done
-# The only one is: an error, and the checkpoint.
+# One has no memory left in the middle of its work: likewise.
+for place in 1 2; do
+    run env LD_PRELOAD="$lose" OVOID_TEST_LOSE=$place:300:-4 "$OVOID" $fit -o lost.ovoid --device 1,2
+    expect_code 0
+    expect_err "warning: device $place, pthread"
+    expect_err "failed and is not used any more: "
+    expect_err "CL_MEM_OBJECT_ALLOCATION_FAILURE (-4)"
+    cmp -s one.ovoid lost.ovoid || fail "the device with memory left should make the same model"
+done
+# The only one has none: a clear end, and the checkpoint.
+run env LD_PRELOAD="$lose" OVOID_TEST_LOSE=1:2000:-4 "$OVOID" $fit -o last.ovoid --device 1 --checkpoint c
+[ "$code" -ne 0 ] || fail "a device without memory should end the fit"
+expect_err "CL_MEM_OBJECT_ALLOCATION_FAILURE (-4)"
+expect_err "the parts that are done are in c: the same command with --resume goes on"
+[ ! -e last.ovoid ] || fail "there should be no model"
+run "$OVOID" $fit -o last.ovoid --device 1 --checkpoint c --resume
+expect_code 0
+cmp -s one.ovoid last.ovoid || fail "the checkpoint should come to the same model"
+rm last.ovoid
+# The only one is lost: an error, and the checkpoint.
 run env LD_PRELOAD="$lose" OVOID_TEST_LOSE=1:2000:-5 "$OVOID" $fit -o last.ovoid --device 1 --checkpoint c
 expect_code 1
 expect_err "CL_OUT_OF_RESOURCES (-5)"

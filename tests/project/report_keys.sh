@@ -1,6 +1,6 @@
 #!/bin/sh
 # report_keys.sh OVOID
-# The guide explains every key of the reports, and no other: those of fits by both methods, with an
+# The guide explains every key of the reports, and no other: those of fits by both methods, in parts, with an
 # assembly, levels and all options that add some, of several molecules, of all models of a file, and of `ovoid measure`.
 set -u
 ovoid=$1
@@ -27,6 +27,8 @@ fit() {
 fit --ratio 1 --levels 2 --time-limit 1e6 --profile --assembly 1 --owners "$work/o.csv" --report "$work/1.json"
 fit --method l1 --iterations 20 --radii "$work/radii" --report "$work/2.json"
 "$ovoid" measure "$work/a.pdb" "$work/a.ovoid" -q --report "$work/3.json" || exit 1
+awk 'BEGIN { for (i = 0; i < 130; i++) print 1.5 * cos(i), 1.5 * sin(i), 0.5 * i, 1.5 }' >"$work/b.xyzr"
+"$ovoid" fit "$work/b.xyzr" --part-atoms 64 --ratio 0.1 -o "$work/b.ovoid" -q --profile --no-measure --report "$work/6.json" || exit 1
 "$ovoid" fit "$work/a.pdb" --models all --ratio 1 -o "$work/m.ovoid" -q --report "$work/5.json" || exit 1
 "$ovoid" fit "$work/a.pdb" "$work/none.pdb" --ellipsoids 1 --out-dir "$work" --report "$work/4.json" -q 2>/dev/null
 

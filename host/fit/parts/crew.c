@@ -127,6 +127,7 @@ static ovoid_status open_worker(ov_crew *crew, size_t device, ovoid_context **co
     if (ovoid_context_create(context) != OVOID_OK)
         return ov_fail(crew->context, OVOID_ERROR_MEMORY, "no memory for a worker");
     ovoid_context_on_warning(*context, on_warning, crew);
+    (*context)->profile = crew->context->profile;
     const ovoid_status status = ov_device_open_again(crew->context, device, *context);
     return status == OVOID_OK ? OVOID_OK
                               : ov_fail(crew->context, status, "%s", ovoid_context_error(*context));
@@ -207,13 +208,22 @@ static void leave_out_lost(ov_crew *crew) {
     free(lost);
 }
 
+/* What a device that was lost has counted is lost, too. */
+static void absorb(ov_crew *crew, ov_worker *w) {
+    if (w->context && !crew->device[w->device].lost &&
+        ov_device_absorb(crew->context, w->context) != OVOID_OK)
+        add_note(crew, ovoid_context_error(w->context));
+}
+
 void ov_crew_end(ovoid_context *context) {
     ov_crew *const crew = context->crew;
     if (!crew)
         return;
     context->crew = NULL;
-    for (size_t n = 0; n < crew->workers; ++n)
+    for (size_t n = 0; n < crew->workers; ++n) {
+        absorb(crew, &crew->worker[n]);
         ovoid_context_destroy(&crew->worker[n].context);
+    }
     ov_crew_tell(crew);
     leave_out_lost(crew);
     for (size_t n = 0; n < crew->notes; ++n)

@@ -7,7 +7,7 @@
 #include "fit/parts/crew.h"
 #include "fit/parts/patch.h"
 #include "fit/parts/record.h"
-#include "fit/parts/rounds.h"
+#include "fit/parts/sharing.h"
 #include "fit/parts/survey_bytes.h"
 #include "fit/parts/workers.h"
 
@@ -213,7 +213,8 @@ static ovoid_status resume(ovoid_context *context, job *j) {
 static ovoid_status fit_all(ovoid_context *context, job *j) {
     ovoid_status status = OVOID_OK;
     const ov_partition *const cut = &j->parts->partition;
-    const ov_shared_work work = {.work = {.todo = j->todo,
+    const ov_shared_work work = {.kind = OVOID_TASK_FIT,
+                                 .work = {.todo = j->todo,
                                           .in_turn = true,
                                           .task = fit_task,
                                           .commit = fit_commit,
@@ -262,6 +263,7 @@ static ovoid_status survey(ovoid_context *context, job *j) {
     ovoid_status status = OVOID_OK;
     const ov_partition *const cut = &j->parts->partition;
     const ov_shared_work work = {
+        .kind = OVOID_TASK_JUDGE,
         .work = {.todo = j->todo, .task = survey_task, .commit = survey_commit, .user = j},
         .pack = survey_pack,
         .unpack = survey_unpack};
@@ -474,6 +476,7 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
         of_parts.spacing = ov_default_spacing(atoms, options->decay);
     OV_TRY(prepare(context, &parts, &j));
     OV_TRY(ov_crew_begin(context)); /* for all that follows */
+    OV_TRY(ov_times_begin(context, ov_ranks_shared(ranks) ? ranks->exchange->ranks : 1));
     result->sample_seconds = ov_seconds() - began;
     OV_TRY(fit_all(context, &j));
     add_results(&parts, result);

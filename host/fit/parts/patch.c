@@ -2,8 +2,8 @@
 
 #include "fit/adaptive/constants.h"
 #include "fit/parts/record.h"
-#include "fit/parts/rounds.h"
 #include "fit/parts/scene.h"
+#include "fit/parts/sharing.h"
 #include "fit/parts/workers.h"
 #include "mesh/union.h"
 
@@ -410,8 +410,10 @@ ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t job
                    .reach = ov_tuned.patch_reach * length};
     OV_TRY(make_patches(context, spots, count, &all));
     for (uint32_t colour = 0; colour < all.cut.colours; ++colour) {
-        const ov_shared_work work = {
-            .work = {.todo = all.todo, .task = task, .user = &all}, .pack = pack, .unpack = unpack};
+        const ov_shared_work work = {.kind = OVOID_TASK_MEND,
+                                     .work = {.todo = all.todo, .task = task, .user = &all},
+                                     .pack = pack,
+                                     .unpack = unpack};
         for (size_t p = 0; p < all.cut.count; ++p)
             all.todo[p] = all.cut.part[p].colour == colour;
         OV_TRY(ov_ranks_work(context, parts->ranks, &all.cut, jobs, &work));

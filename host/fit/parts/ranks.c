@@ -7,10 +7,11 @@
 #include <string.h>
 
 /* What each rank's message of a gather begins with; then its text and its parts, of each a
- * part_head and its bytes. */
+ * part_head and its bytes. No bytes at all: nothing is new. */
 typedef struct head {
     uint64_t status;
     uint64_t leaving; /* not 0: it has left the work that the others may be at */
+    uint64_t workers;
     uint64_t text, parts;
 } head;
 
@@ -48,7 +49,8 @@ static ovoid_status gather_numbers(ovoid_context *context, ov_ranks *r, uint64_t
     return call(context, r, &mine, r->sizes, each);
 }
 
-/* All bytes of all: how many, then whether everybody has room for them, then themselves. */
+/* All bytes of all, of which r->sizes[2 * ranks + n] are rank n's: how many, then whether everybody
+ * has room for them, then themselves. */
 static ovoid_status gather(ovoid_context *context, ov_ranks *r, const ov_bytes *mine,
                            ov_heard *all) {
     ovoid_status status = OVOID_OK;
@@ -58,6 +60,8 @@ static ovoid_status gather(ovoid_context *context, ov_ranks *r, const ov_bytes *
     memcpy(sizes, r->sizes, ranks_of(r) * sizeof *sizes);
     for (uint32_t n = 0; n < ranks_of(r); ++n)
         made.count += (size_t)sizes[n];
+    if (made.count == 0)
+        return OVOID_OK; /* nobody has anything to say */
     made.bytes = ov_alloc(context, made.count, 1, "what ranks exchange");
     OV_TRY(gather_numbers(context, r, made.bytes != NULL));
     for (uint32_t n = 0; n < ranks_of(r); ++n)
@@ -90,13 +94,24 @@ cleanup:
     return status;
 }
 
-static ovoid_status compose(ovoid_context *context, const ov_speech *speech, ov_bytes *to) {
+static bool is_quiet(const ov_ranks *r, const head *h) {
+    return h->status == OVOID_OK && !h->leaving && h->parts == 0 &&
+           h->workers == r->workers[rank_of(r)];
+}
+
+static ovoid_status compose(ovoid_context *context, const ov_ranks *r, const ov_speech *speech,
+                            ov_bytes *to) {
     ovoid_status status = OVOID_OK;
     const size_t parts = speech->have ? speech->parts : 0;
     const char *const text = speech->status == OVOID_OK ? "" : ovoid_context_error(context);
-    head h = {.status = (uint64_t)speech->status, .leaving = speech->leaving, .text = strlen(text)};
+    head h = {.status = (uint64_t)speech->status,
+              .leaving = speech->leaving,
+              .workers = speech->workers,
+              .text = strlen(text)};
     for (size_t p = 0; p < parts; ++p)
         h.parts += speech->have[p];
+    if (is_quiet(r, &h))
+        return OVOID_OK;
     OV_TRY(ov_bytes_put(context, to, &h, sizeof h));
     OV_TRY(ov_bytes_put(context, to, text, (size_t)h.text));
     for (size_t p = 0; p < parts; ++p)
@@ -131,6 +146,7 @@ static ovoid_status read_rank(ovoid_context *context, ov_ranks *r, uint32_t rank
     if (!ov_bytes_take(from, &h, sizeof h) || h.text > from->left)
         return ov_ranks_garbled(context, r);
     weigh(&h, from->next, rank, all);
+    r->workers[rank] = (uint32_t)h.workers;
     from->next += h.text;
     from->left -= (size_t)h.text;
     for (uint64_t n = 0; n < h.parts; ++n) {
@@ -153,11 +169,12 @@ ovoid_status ov_ranks_say(ovoid_context *context, ov_ranks *ranks, const ov_spee
     ov_bytes mine = {0};
     if (speech->parts > 0)
         memset(at, 0, speech->parts * sizeof *at);
-    const ovoid_status made = compose(context, speech, &mine);
+    const ovoid_status made = compose(context, ranks, speech, &mine);
     OV_TRY(gather(context, ranks, made == OVOID_OK ? &mine : &least, heard));
     ov_reading from = {heard->bytes, heard->count};
-    for (uint32_t rank = 0; rank < ranks_of(ranks); ++rank)
-        OV_TRY(read_rank(context, ranks, rank, speech->parts, &from, at, heard));
+    for (uint32_t rank = 0; rank < ranks_of(ranks) && heard->count > 0; ++rank)
+        if (ranks->sizes[2 * (size_t)ranks_of(ranks) + rank] > 0)
+            OV_TRY(read_rank(context, ranks, rank, speech->parts, &from, at, heard));
     ranks->over = ranks->over || heard->status != OVOID_OK;
 cleanup:
     ov_bytes_destroy(&mine);
@@ -183,7 +200,7 @@ ovoid_status ov_heard_tell(ovoid_context *context, const ov_heard *heard) {
 typedef struct hello {
     uint64_t order, version, input, options, parts, start; /* the same */
     uint64_t device;                                       /* 0: none could be opened */
-    uint64_t keeps, jobs;
+    uint64_t keeps;
 } hello;
 
 static hello hello_of(const ovoid_fit_options *options, const double *xyzr, size_t atoms,
@@ -194,8 +211,7 @@ static hello hello_of(const ovoid_fit_options *options, const double *xyzr, size
                    .options = ov_fit_options_hash(options),
                    .parts = options->parts.atoms | (uint64_t)options->parts.symmetry << 32,
                    .start = start,
-                   .keeps = options->parts.checkpoint != NULL,
-                   .jobs = options->parts.jobs > 1 ? options->parts.jobs : 1};
+                   .keeps = options->parts.checkpoint != NULL};
 }
 
 /* What one rank has that rank 0 has not; NULL: nothing. */
@@ -225,8 +241,7 @@ static ovoid_status compare(ovoid_context *context, ov_ranks *r, const hello *al
                        "rank %lu %s, compared with rank 0: all ranks share one fit",
                        (unsigned long)n, what);
     }
-    r->keeps = all[0].keeps != 0;
-    r->jobs = all[0].jobs;
+    r->alike = equal;
     if (!equal && rank_of(r) == 0)
         ov_warn(context, "the ranks have different devices or drivers: with another number of "
                          "ranks the last bits of the model may be others");
@@ -245,7 +260,8 @@ ovoid_status ov_ranks_begin(ovoid_context *context, const ovoid_fit_options *opt
     OV_TRY(ov_exchange_check(context, exchange));
     ranks->sizes = ov_alloc(context, 3 * (size_t)exchange->ranks, sizeof *ranks->sizes, "ranks");
     all = ov_alloc(context, exchange->ranks, sizeof *all, "ranks");
-    if (!ranks->sizes || !all) {
+    ranks->workers = ov_alloc(context, exchange->ranks, sizeof *ranks->workers, "ranks");
+    if (!ranks->sizes || !ranks->workers || !all) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
@@ -277,6 +293,7 @@ ovoid_status ov_ranks_end(ovoid_context *context, ov_ranks *ranks, ovoid_status 
     if (ov_ranks_shared(ranks) && !ranks->over)
         status = agree(context, ranks, status);
     free(ranks->sizes);
+    free(ranks->workers);
     *ranks = (ov_ranks){0};
     return status;
 }

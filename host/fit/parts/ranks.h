@@ -3,7 +3,7 @@
  * is heard by all, that of its sender too.
  *
  * Ranks stay in step as each gather is one of all: a rank that fails, wherever it does, tells so in
- * the next one, and all leave then. The work they share is in rounds.h.
+ * the next one, and all leave then. The work they share is in sharing.h.
  */
 #ifndef OV_FIT_RANKS_H
 #define OV_FIT_RANKS_H
@@ -13,10 +13,10 @@
 /* {0}: there is one process. */
 typedef struct ov_ranks {
     const ovoid_exchange *exchange;
-    uint64_t *sizes; /* room for numbers of each rank */
-    bool over;       /* all have been told that it failed, or that it is done */
-    bool keeps;      /* rank 0 has a checkpoint */
-    uint64_t jobs;   /* of rank 0 */
+    uint64_t *sizes;   /* room for numbers of each rank */
+    uint32_t *workers; /* of each rank: so many it last said that it has */
+    bool over;         /* all have been told that it failed, or that it is done */
+    bool alike;        /* all have equal devices */
 } ov_ranks;
 
 static inline bool ov_ranks_shared(const ov_ranks *ranks) {
@@ -43,6 +43,7 @@ ovoid_status ov_ranks_end(ovoid_context *context, ov_ranks *ranks, ovoid_status 
 typedef struct ov_speech {
     ovoid_status status; /* the context has its text */
     bool leaving;        /* it has left the work that the others may be at */
+    uint32_t workers;    /* that it has for parts */
     size_t parts;
     const bool *have; /* of each part, whether pack() is to tell of it; NULL: of none */
     ovoid_status (*pack)(ovoid_context *context, size_t part, ov_bytes *to, void *user);

@@ -9,8 +9,10 @@
 #include <string.h>
 #include <time.h>
 
-/* How often the caller is told while others work, seconds. */
+/* How often the caller is told while others work, and how often processes that share the work meet,
+ * seconds: a task takes longer, and a message less. */
 #define TELL_EVERY 0.05
+#define MEET_EVERY 0.004
 
 /* What the workers share, under its lock. */
 typedef struct yard {
@@ -20,11 +22,17 @@ typedef struct yard {
     ov_crew *crew;
     const ov_partition *partition;
     const ov_part_work *work;
-    bool *taken;    /* parts that a worker has, or had, or that are not to be worked on */
-    bool *ended;    /* and of these, those with which nobody is at work any more */
-    bool *spilt;    /* parts for which a device has had too little memory */
-    size_t *device; /* where each is to be worked on; NULL: on any device of the list */
-    size_t done, working;
+    bool *taken;             /* parts that a worker has, or had, or that are not to be worked on */
+    bool *ended;             /* and of these, those with which nobody is at work any more */
+    bool *spilt;             /* parts for which a device has had too little memory */
+    bool *made;              /* parts, since processes last met */
+    bool *telling, *granted; /* what the meeting under way is about */
+    size_t *device;          /* where each is to be worked on; NULL: on any device of the list */
+    size_t done;             /* parts; where processes meet, of all of them */
+    size_t working;
+    bool over;           /* where they meet: all parts are done */
+    double told_at;      /* ov_seconds() */
+    uint32_t most;       /* workers that there were */
     ovoid_status status; /* the first that is not OVOID_OK, with its text */
     char *error;
     bool stop;             /* no part is begun any more, and those under way end */
@@ -97,33 +105,44 @@ static bool give_back(yard *y, ov_worker *w, size_t p, ovoid_status status) {
     return true;
 }
 
+static size_t number_of(const yard *y, const ov_worker *w) {
+    return w ? (size_t)(w - y->crew->worker) : 0;
+}
+
 /* Works on part p with the yard's lock open meanwhile. w: NULL where the caller's context works. */
 static void work_on(yard *y, ovoid_context *context, ov_worker *w, size_t p) {
     const ov_part_work *const work = y->work;
-    const size_t done = y->done - work->elsewhere;
+    const size_t done = y->done;
     y->taken[p] = true;
     if (w)
         w->in_company = ov_crew_on(y->crew, w->device) > 1;
     context->device->ran_out = false;
     pthread_mutex_unlock(&y->lock);
+    const double began = ov_seconds();
     ovoid_status status = work->task(context, p, done, work->user);
     pthread_mutex_lock(&y->lock);
     const bool made = status == OVOID_OK;
-    if (made && work->commit)
+    if (made && work->commit && !work->meet)
         status = work->commit(context, p, work->user);
     if (status == OVOID_OK) {
-        y->ended[p] = true;
-        ++y->done;
+        if (work->time)
+            work->time[p] = (ov_task_time){began, ov_seconds() - began, number_of(y, w)};
+        y->ended[p] = y->made[p] = true;
+        y->done += !work->meet;
     } else if (made || !give_back(y, w, p, status)) {
         set_failure(y, context, status);
     }
     pthread_cond_broadcast(&y->changed);
 }
 
+static bool is_over(const yard *y) {
+    return y->stop || (y->work->meet ? y->over : y->done == y->partition->count);
+}
+
 /* Works on parts until all have ended, with the yard's lock: one that another worker has may come
  * back. */
 static void work(yard *y, ovoid_context *context, ov_worker *w) {
-    while (!y->stop && y->done < y->partition->count && !(w && w->dismissed)) {
+    while (!is_over(y) && !(w && w->dismissed)) {
         const size_t p = next_part(y, w);
         if (p < y->partition->count)
             work_on(y, context, w, p);
@@ -161,27 +180,78 @@ static void *run(void *user) {
     return NULL;
 }
 
-/* Tells the caller what is going on until all workers have ended, and those when it has had enough.
- */
+/* With the yard's lock, for so many seconds or until something has changed. */
+static void wait_for(yard *y, double seconds) {
+    struct timespec until;
+    clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_nsec += (long)(seconds * 1e9);
+    until.tv_sec += until.tv_nsec / 1000000000;
+    until.tv_nsec %= 1000000000;
+    pthread_cond_timedwait(&y->changed, &y->lock, &until);
+}
+
+/* Tells the caller what is going on, with the yard's lock open meanwhile. */
+static void tell(yard *y) {
+    ovoid_progress told = y->latest;
+    told.done = y->done;
+    told.total = y->partition->count;
+    const bool over = y->stop || y->over || !told.stage;
+    y->told_at = ov_seconds();
+    pthread_mutex_unlock(&y->lock);
+    ov_crew_tell(y->crew);
+    const bool go_on = over || ov_progress_report(y->context, &told);
+    pthread_mutex_lock(&y->lock);
+    if (!go_on && y->status == OVOID_OK)
+        set_failure(y, y->context,
+                    ov_fail(y->context, OVOID_ERROR_CANCELLED, "stopped while fitting parts"));
+}
+
+/* Makes what was granted free to be taken. */
+static void take_grants(yard *y) {
+    for (size_t p = 0; p < y->partition->count; ++p)
+        if (y->granted[p])
+            y->taken[p] = y->granted[p] = false;
+}
+
+/* Meets the other processes, with the yard's lock open meanwhile: workers add to `made` what they
+ * do until the next time. What all have heard of a failure takes the place of what was known of it
+ * here. */
+static void meet(yard *y) {
+    const size_t count = y->partition->count;
+    ov_meeting m = {.status = y->status,
+                    .workers = (uint32_t)ov_crew_left(y->crew),
+                    .made = y->telling,
+                    .granted = y->granted,
+                    .done = y->done};
+    memcpy(y->telling, y->made, count * sizeof *y->made);
+    memset(y->made, 0, count * sizeof *y->made);
+    pthread_mutex_unlock(&y->lock);
+    if (m.status != OVOID_OK)
+        ov_fail(y->context, m.status, "%s", y->error ? y->error : "");
+    const ovoid_status status = y->work->meet(y->context, &m, y->work->user);
+    pthread_mutex_lock(&y->lock);
+    y->done = m.done;
+    y->over = m.over || status != OVOID_OK;
+    take_grants(y);
+    if (status != OVOID_OK) {
+        free(y->error);
+        y->error = NULL;
+        y->status = OVOID_OK;
+        set_failure(y, y->context, status);
+    }
+    pthread_cond_broadcast(&y->changed);
+}
+
+/* With the yard's lock, until all workers have ended: tells the caller what is going on, and the
+ * workers when the caller has had enough. */
 static void watch(yard *y) {
-    while (y->working > 0) {
-        struct timespec until;
-        clock_gettime(CLOCK_REALTIME, &until);
-        until.tv_nsec += (long)(TELL_EVERY * 1e9);
-        until.tv_sec += until.tv_nsec / 1000000000;
-        until.tv_nsec %= 1000000000;
-        pthread_cond_timedwait(&y->changed, &y->lock, &until);
-        ovoid_progress told = y->latest;
-        told.done = y->done - y->work->elsewhere;
-        told.total = y->partition->count;
-        const bool over = y->stop || !told.stage;
-        pthread_mutex_unlock(&y->lock);
-        ov_crew_tell(y->crew);
-        const bool go_on = over || ov_progress_report(y->context, &told);
-        pthread_mutex_lock(&y->lock);
-        if (!go_on && y->status == OVOID_OK)
-            set_failure(y, y->context,
-                        ov_fail(y->context, OVOID_ERROR_CANCELLED, "stopped while fitting parts"));
+    const bool meets = y->work->meet != NULL;
+    while (y->working > 0 || (meets && !y->over)) {
+        if (meets && !y->over)
+            meet(y);
+        wait_for(y, meets ? MEET_EVERY : TELL_EVERY);
+        if (!meets || ov_seconds() - y->told_at >= TELL_EVERY)
+            tell(y);
     }
 }
 
@@ -206,6 +276,7 @@ static ovoid_status work_together(yard *y, size_t jobs, size_t left) {
     pthread_mutex_lock(&y->lock);
     for (size_t n = 0; n < crew->workers; ++n)
         begun[n] = crew->worker[n].context && begin_work(y, &crew->worker[n]);
+    y->most = (uint32_t)y->working;
     if (y->working == 0)
         set_failure(y, y->context,
                     ov_fail(y->context, OVOID_ERROR_MEMORY, "no thread could be started"));
@@ -237,16 +308,21 @@ static ovoid_status deal_out(yard *y) {
     return OVOID_OK;
 }
 
-/* Parts that are not to be worked on have ended. */
+/* Parts that are not to be worked on have ended; where processes meet, none is free until it is
+ * granted. */
 static ovoid_status open_yard(yard *y) {
     const size_t count = y->partition->count;
+    y->made = ov_alloc(y->context, count, sizeof *y->made, "parts of a molecule");
+    y->telling = ov_alloc(y->context, count, sizeof *y->telling, "parts of a molecule");
+    y->granted = ov_alloc(y->context, count, sizeof *y->granted, "parts of a molecule");
     y->taken = ov_alloc(y->context, count, sizeof *y->taken, "parts of a molecule");
     y->ended = ov_alloc(y->context, count, sizeof *y->ended, "parts of a molecule");
     y->spilt = ov_alloc(y->context, count, sizeof *y->spilt, "parts of a molecule");
-    if (!y->taken || !y->ended || !y->spilt)
+    if (!y->made || !y->telling || !y->granted || !y->taken || !y->ended || !y->spilt)
         return OVOID_ERROR_MEMORY;
     for (size_t p = 0; p < count; ++p) {
-        y->taken[p] = y->ended[p] = y->work->todo && !y->work->todo[p];
+        y->ended[p] = y->work->todo && !y->work->todo[p];
+        y->taken[p] = y->ended[p] || y->work->meet;
         y->done += y->ended[p];
     }
     return y->crew->alike ? OVOID_OK : deal_out(y);
@@ -256,24 +332,29 @@ static void close_yard(yard *y) {
     pthread_cond_destroy(&y->changed);
     pthread_mutex_destroy(&y->lock);
     free(y->error);
+    free(y->made);
+    free(y->telling);
+    free(y->granted);
     free(y->taken);
     free(y->ended);
     free(y->spilt);
     free(y->device);
 }
 
-/* Several devices stand by for each other, even where there is one part left to do; a molecule that
- * is one part is the first one's. */
+/* Whose thread meets others works on no part. Several devices stand by for each other, even where
+ * there is one part left to do; a molecule that is one part is the first one's. */
 static bool is_for_several(const yard *y, size_t jobs, size_t left) {
     const ov_crew *const crew = y->crew;
+    if (y->work->meet)
+        return true;
     if (crew->devices > 1)
         return left > 0 && (crew->workers > 0 || y->partition->count > 1);
     return jobs > 1 && left > 1;
 }
 
 ovoid_status ov_parts_work(ovoid_context *context, const ov_partition *partition, size_t jobs,
-                           const ov_part_work *work_of) {
-    yard y = {.context = context, .partition = partition, .work = work_of};
+                           const ov_part_work *work_of, uint32_t *most) {
+    yard y = {.most = 1, .context = context, .partition = partition, .work = work_of};
     const bool alone = !context->crew; /* no crew is there for longer */
     ovoid_status status = alone ? ov_crew_begin(context) : OVOID_OK;
     if (status != OVOID_OK)
@@ -293,6 +374,8 @@ ovoid_status ov_parts_work(ovoid_context *context, const ov_partition *partition
     if (y.status != OVOID_OK)
         status = ov_fail(context, y.status, "%s", y.error ? y.error : "");
 cleanup:
+    if (most)
+        *most = y.most;
     close_yard(&y);
     if (alone)
         ov_crew_end(context);

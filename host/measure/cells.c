@@ -17,6 +17,8 @@
 #define SHELF ((size_t)1 << 10)
 /* Points that are looked for in other cells at a time: 56 bytes each. */
 #define FARS_MOST ((size_t)1 << 21)
+/* Surfaces of cells that are kept for a second look, bytes. */
+#define KEPT_MOST ((size_t)1 << 28)
 
 typedef struct job {
     ovoid_context *context;
@@ -26,6 +28,8 @@ typedef struct job {
     ov_body *body[OV_SURVEY_SIDES];
     size_t count[OV_SURVEY_SIDES], capacity[OV_SURVEY_SIDES];
     ov_survey_cell *cell;
+    ov_survey_kept **kept; /* of each cell; NULL: nothing is */
+    size_t kept_bytes, kept_most;
     bool *late; /* cells whose points that are far have been left for later */
     size_t cells;
     size_t fars_most; /* points that are looked for in other cells at a time */
@@ -43,7 +47,10 @@ static void destroy(job *j) {
     }
     for (size_t c = 0; j->cell && c < j->cells; ++c)
         ov_survey_cell_destroy(&j->cell[c]);
+    for (size_t c = 0; j->kept && c < j->cells; ++c)
+        ov_survey_kept_destroy(&j->kept[c]);
     free(j->cell);
+    free(j->kept);
     free(j->late);
     ov_survey_standing_destroy(&j->standing);
 }
@@ -59,8 +66,9 @@ static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES], 
     }
     j->cells = j->shelf[j->lead].cut.count;
     j->cell = ov_alloc(j->context, j->cells, sizeof *j->cell, "cells of a surface");
+    j->kept = ov_alloc(j->context, j->cells, sizeof *j->kept, "cells of a surface");
     j->late = ov_alloc(j->context, j->cells, sizeof *j->late, "cells of a surface");
-    if (!j->cell || !j->late)
+    if (!j->cell || !j->kept || !j->late)
         status = OVOID_ERROR_MEMORY;
 cleanup:
     return status;
@@ -94,13 +102,21 @@ static void forget_fars(ov_survey_cell *cell) {
     cell->fars = cell->far_capacity = 0;
 }
 
-static ovoid_status survey(job *j, size_t c, ov_survey_cell *cell) {
+static ovoid_status survey(job *j, size_t c, ov_survey_cell *cell, ov_survey_kept **kept) {
     const ov_box *const box = box_of(j, c);
     ov_survey_terms terms;
     const ovoid_status status = take_terms(j, c, &terms);
     return status != OVOID_OK
                ? status
-               : ov_survey_bodies(j->context, &j->options, &terms, box->low, box->high, cell);
+               : ov_survey_bodies(j->context, &j->options, &terms, box->low, box->high, cell, kept);
+}
+
+static void keep_or_not(job *j, size_t c) {
+    j->kept_bytes += ov_survey_kept_bytes(j->kept[c]);
+    if (j->kept_bytes <= j->kept_most)
+        return;
+    j->kept_bytes -= ov_survey_kept_bytes(j->kept[c]);
+    ov_survey_kept_destroy(&j->kept[c]);
 }
 
 /* Cells with too many points that are far, for now, are left for later. */
@@ -109,7 +125,8 @@ static ovoid_status survey_all(job *j) {
     size_t fars = 0;
     for (size_t c = 0; c < j->cells; ++c) {
         OV_TRY(ov_progress_step(j->context, c, j->cells));
-        OV_TRY(survey(j, c, &j->cell[c]));
+        OV_TRY(survey(j, c, &j->cell[c], j->options.sums ? &j->kept[c] : NULL));
+        keep_or_not(j, c);
         j->late[c] = fars + j->cell[c].fars > j->fars_most;
         if (j->late[c])
             forget_fars(&j->cell[c]);
@@ -119,6 +136,12 @@ cleanup:
     return status;
 }
 
+/* The terms of a cell whose surfaces were not kept. */
+static ovoid_status look_again(job *j, size_t c, ov_survey_terms *terms) {
+    j->options.cell = (uint32_t)c;
+    return j->kept[c] ? OVOID_OK : take_terms(j, c, terms);
+}
+
 /* Where an outer surface was taken for what it is not. */
 static ovoid_status correct(job *j, size_t c) {
     ovoid_status status = OVOID_OK;
@@ -126,9 +149,9 @@ static ovoid_status correct(job *j, size_t c) {
     ov_survey_terms terms;
     if (ov_survey_holds(&j->standing, &j->cell[c], c))
         return OVOID_OK;
-    OV_TRY(take_terms(j, c, &terms));
+    OV_TRY(look_again(j, c, &terms));
     OV_TRY(ov_survey_again(j->context, &j->options, &terms, box->low, box->high, &j->standing,
-                           &j->cell[c]));
+                           j->kept[c], &j->cell[c]));
 cleanup:
     return status;
 }
@@ -194,9 +217,9 @@ static ovoid_status seek(job *j, ov_survey_far *const *far, size_t count, ov_sur
         const size_t found = choose_fars(j, c, far, count, chosen);
         if (found == 0)
             continue;
-        OV_TRY(take_terms(j, c, &terms));
+        OV_TRY(look_again(j, c, &terms));
         OV_TRY(ov_survey_seek(j->context, &j->options, &terms, box->low, box->high, &j->standing,
-                              &j->cell[c], chosen, found));
+                              &j->cell[c], j->kept[c], chosen, found));
     }
 cleanup:
     return status;
@@ -238,7 +261,7 @@ static ovoid_status settle_late(job *j) {
         ov_survey_cell fresh = {0};
         if (!j->late[c])
             continue;
-        OV_TRY(survey(j, c, &fresh));
+        OV_TRY(survey(j, c, &fresh, NULL));
         ov_survey_cell_destroy(&j->cell[c]);
         j->cell[c] = fresh;
         OV_TRY(correct(j, c));
@@ -354,6 +377,7 @@ ovoid_status ov_measure_cells(ovoid_context *context, const ovoid_field *origina
     ovoid_measures made;
     job j = {.context = context,
              .fars_most = how->fars_most > 0 ? how->fars_most : FARS_MOST,
+             .kept_most = how->kept_most > 0 ? how->kept_most : KEPT_MOST,
              .options = {.isovalue = o->isovalue,
                          .spacing = o->spacing,
                          .vertices = o->vertices,

@@ -29,6 +29,7 @@ typedef struct ov_cells_options {
     size_t most;      /* terms of a cell, of the field that has more of them */
     bool distances;   /* else those stay unknown */
     size_t fars_most; /* points that are kept for a look into other cells, in tests; 0: some */
+    size_t kept_most; /* bytes of cells' surfaces that are kept, in tests; 0: some */
 } ov_cells_options;
 
 /* Compares the surfaces. o: of both meshes, whole. seconds_mesh and seconds_distances are filled

@@ -260,6 +260,27 @@ static void kept_surfaces_change_nothing(void **state) {
     }
 }
 
+/* Nor does it how many look at cells side by side. */
+static void hands_change_nothing(void **state) {
+    test_skip_simulated(*state);
+    for (int k = 0; k < 2; ++k) {
+        pair p = k == 0 ? apart(*state, 25.0) : random_pair(*state, 6, test_size(700, 300), 0.8);
+        ov_cells_options how = {.most = 40, .distances = true, .hands = 1};
+        ovoid_measures alone, several;
+        measure_cells(*state, &p, &how, &alone);
+        for (how.hands = 2; how.hands <= 5; how.hands += 3)
+            for (int kept = 0; kept < 2; ++kept) {
+                how.kept_most = kept ? (size_t)1 << 20 : 0;
+                measure_cells(*state, &p, &how, &several);
+                expect_identical(several, alone);
+            }
+        how.fars_most = 2000;
+        measure_cells(*state, &p, &how, &several);
+        expect_same(&several, &alone);
+        pair_destroy(&p);
+    }
+}
+
 static void linear_vertices_and_spacings(void **state) {
     const uint32_t sizes[] = {100};
     pair p = random_pair(*state, 7, 300, 0.5);
@@ -377,6 +398,7 @@ int main(void) {
         cmocka_unit_test(what_is_far_apart),
         cmocka_unit_test(little_is_kept),
         cmocka_unit_test(kept_surfaces_change_nothing),
+        cmocka_unit_test(hands_change_nothing),
         cmocka_unit_test(linear_vertices_and_spacings),
         cmocka_unit_test(far_from_the_origin),
         cmocka_unit_test(without_a_surface),

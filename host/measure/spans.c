@@ -495,7 +495,7 @@ static ovoid_status choose_own(ov_surveyor *s, size_t n, const ov_survey_standin
 
 /* Those of the points that are on the other side n, and want its outer components or all of it. */
 static ovoid_status seek_one(ov_surveyor *s, size_t n, bool outer, const ov_trail *to,
-                             ov_survey_far *const *far, size_t count) {
+                             ov_survey_far *far, size_t count) {
     ovoid_status status = OVOID_OK;
     size_t sites = 0;
     float *const xyz = ov_alloc(s->context, 3 * count, sizeof *xyz, "points that are far");
@@ -505,17 +505,17 @@ static ovoid_status seek_one(ov_surveyor *s, size_t n, bool outer, const ov_trai
         goto cleanup;
     }
     for (size_t k = 0; k < count; ++k)
-        if (far[k]->side != n && far[k]->outer == outer) {
+        if (far[k].side != n && far[k].outer == outer) {
             for (size_t axis = 0; axis < 3; ++axis)
-                xyz[3 * sites + axis] = (float)(far[k]->at[axis] - s->origin[axis]);
-            squared[sites++] = (float)(far[k]->distance * far[k]->distance);
+                xyz[3 * sites + axis] = (float)(far[k].at[axis] - s->origin[axis]);
+            squared[sites++] = (float)(far[k].distance * far[k].distance);
         }
     const ov_sites from = {.count = sites, .xyz = xyz};
     OV_TRY(ov_facets_set(s->context, &s->facets, to, s->origin));
     OV_TRY(ov_facets_nearer(s->context, &s->meter, &s->facets, &from, squared));
     for (size_t k = 0, site = 0; k < count; ++k)
-        if (far[k]->side != n && far[k]->outer == outer) {
-            far[k]->distance = fmin(far[k]->distance, sqrt((double)squared[site]));
+        if (far[k].side != n && far[k].outer == outer) {
+            far[k].distance = fmin(far[k].distance, sqrt((double)squared[site]));
             ++site;
         }
 cleanup:
@@ -524,8 +524,8 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_spans_seek(ov_surveyor *s, const ov_survey_standing *standing,
-                           ov_survey_far *const *far, size_t count) {
+ovoid_status ov_spans_seek(ov_surveyor *s, const ov_survey_standing *standing, ov_survey_far *far,
+                           size_t count) {
     ovoid_status status = OVOID_OK;
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         for (int outer = 0; outer < 2; ++outer) {

@@ -588,7 +588,7 @@ cleanup:
 ovoid_status ov_survey_seek(ovoid_context *context, const ov_survey_options *options,
                             const ov_survey_terms *terms, const double low[3], const double high[3],
                             const ov_survey_standing *standing, const ov_survey_cell *cell,
-                            ov_survey_kept *kept, ov_survey_far *const *far, size_t count) {
+                            ov_survey_kept *kept, ov_survey_far *far, size_t count) {
     ovoid_status status = OVOID_OK;
     ov_surveyor s = {.context = context, .options = options, .low = low, .high = high};
     OV_TRY(open_again(&s, terms, kept));

@@ -168,7 +168,7 @@ ovoid_status ov_survey_again(ovoid_context *context, const ov_survey_options *op
 ovoid_status ov_survey_seek(ovoid_context *context, const ov_survey_options *options,
                             const ov_survey_terms *terms, const double low[3], const double high[3],
                             const ov_survey_standing *standing, const ov_survey_cell *cell,
-                            ov_survey_kept *kept, ov_survey_far *const *far, size_t count);
+                            ov_survey_kept *kept, ov_survey_far *far, size_t count);
 
 /* The distance of a point that was far has become known. */
 void ov_survey_settle(const ov_survey_far *far, ov_survey_cell *cell);

@@ -67,7 +67,7 @@ ovoid_status ov_spans_outer(ov_surveyor *surveyor, const ov_survey_standing *sta
 
 /* Makes the distances of these points smaller where something in the cell is nearer to them. */
 ovoid_status ov_spans_seek(ov_surveyor *surveyor, const ov_survey_standing *standing,
-                           ov_survey_far *const *far, size_t count);
+                           ov_survey_far *far, size_t count);
 
 /* Finds which vertices hang together by triangles in this zone or further in: of[v] leads to the
  * first of them (mesh/union.h); OV_NO_PIECE: v is of no such triangle. */

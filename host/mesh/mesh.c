@@ -1,6 +1,7 @@
 #include "mesh/mesh.h"
 #include "base/parallel.h"
 #include "mesh/components.h"
+#include "mesh/exposed.h"
 #include "mesh/vectors.h"
 
 #include <math.h>
@@ -258,6 +259,8 @@ ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
     OV_TRY(ov_progress_ask(context));
     if (mesh->xyz)
         OV_TRY(check_edges(context, mesh));
+    OV_TRY(ov_progress_ask(context));
+    OV_TRY(ov_mesh_expose(context, mesh));
 cleanup:
     return status;
 }

@@ -1,6 +1,7 @@
 #include "measure/cells.h"
 
 #include "base/progress.h"
+#include "measure/hands.h"
 #include "measure/measure.h"
 #include "measure/survey.h"
 #include "mesh/march.h"
@@ -17,19 +18,44 @@
 #define SHELF ((size_t)1 << 10)
 /* Points that are looked for in other cells at a time: 56 bytes each. */
 #define FARS_MOST ((size_t)1 << 21)
+/* Cells that are looked at side by side for what is far: a number of its own, so that what comes of
+ * it does not depend on how many hands there are. */
+#define SEARCHES 16
+/* Surfaces of cells that are kept for a second look, bytes. */
+#define KEPT_MOST ((size_t)1 << 28)
+
+/* What one of those who look at cells works with. */
+typedef struct desk {
+    ov_survey_options options;
+    ov_body *body[OV_SURVEY_SIDES];
+    size_t count[OV_SURVEY_SIDES], capacity[OV_SURVEY_SIDES];
+    double meshing, busy; /* seconds */
+} desk;
+
+/* What one look into a cell for points that are far is about. */
+typedef struct search {
+    size_t cell;
+    ov_survey_far **far;  /* the points */
+    ov_survey_far *found; /* as they are when the cell has been looked at */
+    size_t count;
+} search;
 
 typedef struct job {
     ovoid_context *context;
     ov_survey_options options;
+    ov_hands *hands;
+    desk *desk; /* of each hand */
     ov_shelf shelf[OV_SURVEY_SIDES];
     size_t lead; /* the side whose parts are the cells */
-    ov_body *body[OV_SURVEY_SIDES];
-    size_t count[OV_SURVEY_SIDES], capacity[OV_SURVEY_SIDES];
     ov_survey_cell *cell;
+    ov_survey_kept **kept; /* of each cell; NULL: nothing is */
+    bool *keeps;           /* cells whose surfaces are to be kept */
+    size_t kept_bytes, kept_most, kept_largest, kept_wanted;
     bool *late; /* cells whose points that are far have been left for later */
     size_t cells;
-    size_t fars_most; /* points that are looked for in other cells at a time */
+    size_t fars, fars_most; /* points that are looked for in other cells at a time */
     ov_survey_standing standing;
+    search *search; /* those under way */
 } job;
 
 static const ov_box *box_of(const job *j, size_t c) {
@@ -37,15 +63,36 @@ static const ov_box *box_of(const job *j, size_t c) {
 }
 
 static void destroy(job *j) {
-    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+    for (size_t h = 0; j->desk && h < ov_hands_count(j->hands); ++h)
+        for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
+            free(j->desk[h].body[n]);
+    ov_hands_destroy(&j->hands);
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         ov_shelf_destroy(&j->shelf[n]);
-        free(j->body[n]);
-    }
+    free(j->desk);
+    free(j->keeps);
     for (size_t c = 0; j->cell && c < j->cells; ++c)
         ov_survey_cell_destroy(&j->cell[c]);
+    for (size_t c = 0; j->kept && c < j->cells; ++c)
+        ov_survey_kept_destroy(&j->kept[c]);
     free(j->cell);
+    free(j->kept);
     free(j->late);
     ov_survey_standing_destroy(&j->standing);
+}
+
+static ovoid_status lay_desks(job *j, size_t wanted) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_hands_create(j->context, wanted, &j->hands));
+    j->desk = ov_alloc(j->context, ov_hands_count(j->hands), sizeof *j->desk, "threads");
+    if (!j->desk)
+        return OVOID_ERROR_MEMORY;
+    for (size_t h = 0; h < ov_hands_count(j->hands); ++h) {
+        j->desk[h].options = j->options;
+        j->desk[h].options.meshing = &j->desk[h].meshing;
+    }
+cleanup:
+    return status;
 }
 
 static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES], size_t most) {
@@ -59,30 +106,36 @@ static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES], 
     }
     j->cells = j->shelf[j->lead].cut.count;
     j->cell = ov_alloc(j->context, j->cells, sizeof *j->cell, "cells of a surface");
+    j->kept = ov_alloc(j->context, j->cells, sizeof *j->kept, "cells of a surface");
+    j->keeps = ov_alloc(j->context, j->cells, sizeof *j->keeps, "cells of a surface");
     j->late = ov_alloc(j->context, j->cells, sizeof *j->late, "cells of a surface");
-    if (!j->cell || !j->late)
+    if (!j->cell || !j->kept || !j->keeps || !j->late)
         status = OVOID_ERROR_MEMORY;
 cleanup:
     return status;
 }
 
-/* The terms that make the surfaces in a cell and its halo what they are. */
-static ovoid_status take_terms(job *j, size_t c, ov_survey_terms *terms) {
+/* The terms that make the surfaces in a cell and its halo what they are; none where these are kept.
+ */
+static ovoid_status take_terms(const job *j, ovoid_context *context, desk *d, size_t c,
+                               ov_survey_terms *terms) {
     const double reach = j->options.halo + OV_SURVEY_ROOM * j->options.spacing;
     ov_box box = *box_of(j, c);
+    d->options.cell = (uint32_t)c;
+    if (j->kept[c])
+        return OVOID_OK;
     for (size_t k = 0; k < 3; ++k) {
         box.low[k] -= reach;
         box.high[k] += reach;
     }
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
-        const ovoid_status status = ov_shelf_take(j->context, &j->shelf[n], &box, &j->body[n],
-                                                  &j->count[n], &j->capacity[n]);
+        const ovoid_status status =
+            ov_shelf_take(context, &j->shelf[n], &box, &d->body[n], &d->count[n], &d->capacity[n]);
         if (status != OVOID_OK)
             return status;
-        terms->body[n] = j->body[n];
-        terms->count[n] = j->count[n];
+        terms->body[n] = d->body[n];
+        terms->count[n] = d->count[n];
     }
-    j->options.cell = (uint32_t)c;
     return OVOID_OK;
 }
 
@@ -94,54 +147,80 @@ static void forget_fars(ov_survey_cell *cell) {
     cell->fars = cell->far_capacity = 0;
 }
 
-static ovoid_status survey(job *j, size_t c, ov_survey_cell *cell) {
+static ovoid_status survey(const job *j, ovoid_context *context, desk *d, size_t c,
+                           ov_survey_cell *cell, ov_survey_kept **kept) {
     const ov_box *const box = box_of(j, c);
+    const double began = ov_seconds();
     ov_survey_terms terms;
-    const ovoid_status status = take_terms(j, c, &terms);
-    return status != OVOID_OK
-               ? status
-               : ov_survey_bodies(j->context, &j->options, &terms, box->low, box->high, cell);
-}
-
-/* Cells with too many points that are far, for now, are left for later. */
-static ovoid_status survey_all(job *j) {
-    ovoid_status status = OVOID_OK;
-    size_t fars = 0;
-    for (size_t c = 0; c < j->cells; ++c) {
-        OV_TRY(ov_progress_step(j->context, c, j->cells));
-        OV_TRY(survey(j, c, &j->cell[c]));
-        j->late[c] = fars + j->cell[c].fars > j->fars_most;
-        if (j->late[c])
-            forget_fars(&j->cell[c]);
-        fars += j->cell[c].fars;
-    }
-cleanup:
+    ovoid_status status = take_terms(j, context, d, c, &terms);
+    if (status == OVOID_OK)
+        status = ov_survey_bodies(context, &d->options, &terms, box->low, box->high, cell, kept);
+    d->busy += ov_seconds() - began;
     return status;
 }
 
-/* Where an outer surface was taken for what it is not. */
-static ovoid_status correct(job *j, size_t c) {
+/* As far as is known from the cells before, there is room for the surfaces of one more. */
+static void begin_survey(size_t c, void *user) {
+    job *const j = user;
+    j->keeps[c] = j->options.sums && j->kept_wanted + j->kept_largest <= j->kept_most;
+    if (j->keeps[c])
+        j->kept_wanted += j->kept_largest;
+}
+
+static ovoid_status survey_one(ovoid_context *context, size_t hand, size_t c, void *user) {
+    job *const j = user;
+    return survey(j, context, &j->desk[hand], c, &j->cell[c], j->keeps[c] ? &j->kept[c] : NULL);
+}
+
+static void keep_or_not(job *j, size_t c) {
+    const size_t bytes = ov_survey_kept_bytes(j->kept[c]);
+    if (j->kept_bytes + bytes > j->kept_most)
+        ov_survey_kept_destroy(&j->kept[c]);
+    else
+        j->kept_bytes += bytes;
+    j->kept_largest = bytes > j->kept_largest ? bytes : j->kept_largest;
+    j->kept_wanted = j->kept_bytes > j->kept_wanted ? j->kept_bytes : j->kept_wanted;
+}
+
+/* A cell with too many points that are far, for now, is left for later. */
+static void end_survey(size_t c, void *user) {
+    job *const j = user;
+    keep_or_not(j, c);
+    j->late[c] = j->fars + j->cell[c].fars > j->fars_most;
+    if (j->late[c])
+        forget_fars(&j->cell[c]);
+    j->fars += j->cell[c].fars;
+}
+
+static ovoid_status survey_all(job *j) {
+    const ov_hands_work work = {j->cells, begin_survey, end_survey, survey_one, j};
+    return ov_hands_do(j->hands, &work);
+}
+
+/* Where an outer surface was taken for what it is not, or for nothing yet. */
+static ovoid_status correct(job *j, ovoid_context *context, desk *d, size_t c) {
     ovoid_status status = OVOID_OK;
     const ov_box *const box = box_of(j, c);
+    const double began = ov_seconds();
     ov_survey_terms terms;
     if (ov_survey_holds(&j->standing, &j->cell[c], c))
         return OVOID_OK;
-    OV_TRY(take_terms(j, c, &terms));
-    OV_TRY(ov_survey_again(j->context, &j->options, &terms, box->low, box->high, &j->standing,
-                           &j->cell[c]));
+    OV_TRY(take_terms(j, context, d, c, &terms));
+    OV_TRY(ov_survey_again(context, &d->options, &terms, box->low, box->high, &j->standing,
+                           j->kept[c], &j->cell[c]));
 cleanup:
+    d->busy += ov_seconds() - began;
     return status;
 }
 
+static ovoid_status correct_one(ovoid_context *context, size_t hand, size_t c, void *user) {
+    job *const j = user;
+    return j->late[c] ? OVOID_OK : correct(j, context, &j->desk[hand], c);
+}
+
 static ovoid_status correct_all(job *j) {
-    ovoid_status status = OVOID_OK;
-    for (size_t c = 0; c < j->cells; ++c) {
-        OV_TRY(ov_progress_step(j->context, c, j->cells));
-        if (!j->late[c])
-            OV_TRY(correct(j, c));
-    }
-cleanup:
-    return status;
+    const ov_hands_work work = {j->cells, NULL, NULL, correct_one, j};
+    return ov_hands_do(j->hands, &work);
 }
 
 /* ---- what is far ----------------------------------------------------------------------------- */
@@ -168,36 +247,91 @@ static void bound_far(const job *j, ov_survey_far *far) {
         }
 }
 
-/* Those which something in cell c may be nearer to. */
-static size_t choose_fars(const job *j, size_t c, ov_survey_far *const *far, size_t count,
-                          ov_survey_far **chosen) {
-    size_t found = 0;
-    for (size_t k = 0; k < count; ++k)
-        if (far[k]->cell != c && j->cell[c].side[1 - far[k]->side].pieces > 0 &&
-            distance_to(box_of(j, c), far[k]->at) < far[k]->distance)
-            chosen[found++] = far[k];
-    return found;
+/* Whether something in cell c may be nearer to it. */
+static bool may_be_near(const job *j, size_t c, const ov_survey_far *far) {
+    return far->cell != c && j->cell[c].side[1 - far->side].pieces > 0 &&
+           distance_to(box_of(j, c), far->at) < far->distance;
 }
 
-/* Looks for these points in all cells. chosen: room for as many. */
-static ovoid_status seek(job *j, ov_survey_far *const *far, size_t count, ov_survey_far **chosen) {
+/* Copies of the points change until all searches under way have ended, so that none of them
+ * depends on another. */
+static ovoid_status choose_fars(const job *j, size_t c, ov_survey_far *const *far, size_t count,
+                                search *made) {
+    *made = (search){.cell = c};
+    for (size_t k = 0; k < count; ++k)
+        made->count += may_be_near(j, c, far[k]);
+    if (made->count == 0)
+        return OVOID_OK;
+    made->far = ov_alloc(j->context, made->count, sizeof(void *), "points that are far");
+    made->found = ov_alloc(j->context, made->count, sizeof *made->found, "points that are far");
+    if (!made->far || !made->found)
+        return OVOID_ERROR_MEMORY;
+    made->count = 0;
+    for (size_t k = 0; k < count; ++k)
+        if (may_be_near(j, c, far[k])) {
+            made->found[made->count] = *far[k];
+            made->far[made->count++] = far[k];
+        }
+    return OVOID_OK;
+}
+
+static ovoid_status search_one(ovoid_context *context, size_t hand, size_t n, void *user) {
+    job *const j = user;
+    desk *const d = &j->desk[hand];
+    ovoid_status status = OVOID_OK;
+    const search *const s = &j->search[n];
+    const ov_box *const box = box_of(j, s->cell);
+    const double began = ov_seconds();
+    ov_survey_terms terms;
+    OV_TRY(take_terms(j, context, d, s->cell, &terms));
+    OV_TRY(ov_survey_seek(context, &d->options, &terms, box->low, box->high, &j->standing,
+                          &j->cell[s->cell], j->kept[s->cell], s->found, s->count));
+cleanup:
+    d->busy += ov_seconds() - began;
+    return status;
+}
+
+static void end_searches(search *searches, size_t count) {
+    for (size_t n = 0; n < count; ++n) {
+        for (size_t k = 0; searches[n].found && k < searches[n].count; ++k)
+            searches[n].far[k]->distance =
+                fmin(searches[n].far[k]->distance, searches[n].found[k].distance);
+        free(searches[n].far);
+        free(searches[n].found);
+    }
+}
+
+/* Looks for these points in the cells from first on, in so many that have to be looked at; *end:
+ * in those before it. */
+static ovoid_status seek_in(job *j, ov_survey_far *const *far, size_t count, size_t first,
+                            size_t *end) {
+    ovoid_status status = OVOID_OK;
+    search searches[SEARCHES] = {{0}};
+    size_t under_way = 0;
+    for (*end = first; *end < j->cells && under_way < SEARCHES; ++*end) {
+        OV_TRY(ov_progress_step(j->context, *end, j->cells));
+        OV_TRY(choose_fars(j, *end, far, count, &searches[under_way]));
+        under_way += searches[under_way].count > 0;
+    }
+    j->search = searches;
+    const ov_hands_work work = {under_way, NULL, NULL, search_one, j};
+    OV_TRY(ov_hands_do(j->hands, &work));
+cleanup:
+    j->search = NULL;
+    end_searches(searches, SEARCHES);
+    return status;
+}
+
+/* Looks for these points in all cells. */
+static ovoid_status seek(job *j, ov_survey_far *const *far, size_t count) {
     ovoid_status status = OVOID_OK;
     for (size_t k = 0; k < count; ++k) {
         OV_TRY(ov_progress_ask(j->context));
         if (isinf(far[k]->distance))
             bound_far(j, far[k]);
     }
-    for (size_t c = 0; c < j->cells; ++c) {
-        const ov_box *const box = box_of(j, c);
-        ov_survey_terms terms;
-        OV_TRY(ov_progress_step(j->context, c, j->cells));
-        const size_t found = choose_fars(j, c, far, count, chosen);
-        if (found == 0)
-            continue;
-        OV_TRY(take_terms(j, c, &terms));
-        OV_TRY(ov_survey_seek(j->context, &j->options, &terms, box->low, box->high, &j->standing,
-                              &j->cell[c], chosen, found));
-    }
+    for (size_t first = 0; first < j->cells;)
+        OV_TRY(seek_in(j, far, count, first, &first));
 cleanup:
     return status;
 }
@@ -206,28 +340,24 @@ cleanup:
 static ovoid_status settle(job *j, size_t first, size_t end) {
     ovoid_status status = OVOID_OK;
     size_t count = 0, next = 0;
-    ov_survey_far **far = NULL, **chosen = NULL;
+    ov_survey_far **far = NULL;
     for (size_t c = first; c < end; ++c)
         count += j->cell[c].fars;
     if (count == 0)
         return OVOID_OK;
-    far = ov_alloc(j->context, count, sizeof *far, "points that are far");
-    chosen = ov_alloc(j->context, count, sizeof *chosen, "points that are far");
-    if (!far || !chosen) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
+    far = ov_alloc(j->context, count, sizeof(void *), "points that are far");
+    if (!far)
+        return OVOID_ERROR_MEMORY;
     for (size_t c = first; c < end; ++c)
         for (size_t k = 0; k < j->cell[c].fars; ++k)
             far[next++] = &j->cell[c].far[k];
-    OV_TRY(seek(j, far, count, chosen));
+    OV_TRY(seek(j, far, count));
     for (size_t k = 0; k < count; ++k)
         ov_survey_settle(far[k], &j->cell[far[k]->cell]);
     for (size_t c = first; c < end; ++c)
         forget_fars(&j->cell[c]);
 cleanup:
     free(far);
-    free(chosen);
     return status;
 }
 
@@ -238,10 +368,11 @@ static ovoid_status settle_late(job *j) {
         ov_survey_cell fresh = {0};
         if (!j->late[c])
             continue;
-        OV_TRY(survey(j, c, &fresh));
+        ov_survey_kept_destroy(&j->kept[c]);
+        OV_TRY(survey(j, j->context, &j->desk[0], c, &fresh, NULL));
         ov_survey_cell_destroy(&j->cell[c]);
         j->cell[c] = fresh;
-        OV_TRY(correct(j, c));
+        OV_TRY(correct(j, j->context, &j->desk[0], c));
         OV_TRY(settle(j, c, c + 1));
     }
 cleanup:
@@ -306,6 +437,16 @@ static ovoid_status distances_of(job *j, const ov_survey_sums sums[OV_SURVEY_SID
     return OVOID_OK;
 }
 
+/* The share of the time in which those who looked at cells meshed. */
+static double meshing_share(const job *j) {
+    double meshing = 0.0, busy = 0.0;
+    for (size_t h = 0; h < ov_hands_count(j->hands); ++h) {
+        meshing += j->desk[h].meshing;
+        busy += j->desk[h].busy;
+    }
+    return busy > 0.0 ? meshing / busy : 0.0;
+}
+
 /* There are no images of it all. */
 static const ov_survey_images alone = {.count = 1};
 
@@ -350,21 +491,21 @@ ovoid_status ov_measure_cells(ovoid_context *context, const ovoid_field *origina
     ovoid_status status = OVOID_OK;
     const ovoid_field *fields[OV_SURVEY_SIDES] = {original, sparse};
     const double began = ov_seconds();
-    double meshing = 0.0;
     ovoid_measures made;
     job j = {.context = context,
              .fars_most = how->fars_most > 0 ? how->fars_most : FARS_MOST,
+             .kept_most = how->kept_most > 0 ? how->kept_most : KEPT_MOST,
              .options = {.isovalue = o->isovalue,
                          .spacing = o->spacing,
                          .vertices = o->vertices,
                          .least = INFINITY,
                          .halo = fmax(HALO, HALO_STEPS * o->spacing),
                          .sums = how->distances,
-                         .contents = !how->distances,
-                         .meshing = &meshing}};
+                         .contents = !how->distances}};
     ovoid_measures_init(&made, sizeof made);
     ov_progress_stage(context, "measure");
     OV_TRY(prepare(&j, fields, how->most));
+    OV_TRY(lay_desks(&j, how->hands));
     OV_TRY(survey_all(&j));
     OV_TRY(check_surfaces(&j, empty));
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
@@ -372,8 +513,9 @@ ovoid_status ov_measure_cells(ovoid_context *context, const ovoid_field *origina
     OV_TRY(find_contents(&j, &made));
     if (how->distances)
         OV_TRY(find_distances(&j, &made));
-    made.seconds_mesh = meshing;
-    made.seconds_distances = ov_seconds() - began - meshing;
+    const double seconds = ov_seconds() - began;
+    made.seconds_mesh = meshing_share(&j) * seconds;
+    made.seconds_distances = seconds - made.seconds_mesh;
     *measures = made;
 cleanup:
     destroy(&j);

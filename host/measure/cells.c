@@ -17,14 +17,16 @@
 #define SHELF ((size_t)1 << 10)
 /* Points that are looked for in other cells at a time: 56 bytes each. */
 #define FARS_MOST ((size_t)1 << 21)
-
 typedef struct job {
     ovoid_context *context;
     ov_survey_options options;
     ov_shelf shelf[OV_SURVEY_SIDES];
     size_t lead; /* the side whose parts are the cells */
-    ov_body *body[OV_SURVEY_SIDES];
-    size_t count[OV_SURVEY_SIDES], capacity[OV_SURVEY_SIDES];
+    ov_survey_images images;
+    double centre[3]; /* of the images */
+    ov_rigid *back;   /* from each image to the unit */
+    ov_unit_ends ends;
+    ov_taken taken[OV_SURVEY_SIDES];
     ov_survey_cell *cell;
     bool *late; /* cells whose points that are far have been left for later */
     size_t cells;
@@ -32,31 +34,61 @@ typedef struct job {
     ov_survey_standing standing;
 } job;
 
-static const ov_box *box_of(const job *j, size_t c) {
-    return &j->shelf[j->lead].cut.part[c].cell;
+static ov_box box_of(const job *j, size_t c) {
+    ov_box box = j->shelf[j->lead].cut.part[c].cell;
+    for (size_t k = 0; j->images.count > 1 && k < 3; ++k) {
+        box.low[k] = fmax(box.low[k], j->ends.box.low[k]);
+        box.high[k] = fmin(box.high[k], j->ends.box.high[k]);
+    }
+    return box;
 }
 
 static void destroy(job *j) {
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         ov_shelf_destroy(&j->shelf[n]);
-        free(j->body[n]);
+        ov_taken_destroy(&j->taken[n]);
     }
     for (size_t c = 0; j->cell && c < j->cells; ++c)
         ov_survey_cell_destroy(&j->cell[c]);
     free(j->cell);
     free(j->late);
+    free(j->back);
     ov_survey_standing_destroy(&j->standing);
 }
 
-static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES], size_t most) {
+/* The images of a unit, and what is told of them from its shelves. */
+static ovoid_status prepare_images(job *j, const ov_repeat *repeat) {
+    ovoid_status status = OVOID_OK;
+    j->back = ov_alloc(j->context, repeat->order, sizeof *j->back, "seams between units");
+    if (!j->back)
+        return OVOID_ERROR_MEMORY;
+    for (size_t g = 0; g < repeat->order; ++g)
+        j->back[g] = ov_rigid_inverse(&repeat->motion[g]);
+    ov_rigid_centre(repeat->motion, repeat->order, j->centre);
+    j->images = (ov_survey_images){.image = repeat->motion,
+                                   .count = repeat->order,
+                                   .spacing = j->options.spacing,
+                                   .centre = j->centre};
+    OV_TRY(ov_unit_find_ends(j->context, j->shelf[0].field, j->shelf[1].field, j->options.isovalue,
+                             j->back, repeat->order, &j->ends));
+    j->options.nearest = j->ends.nearest;
+cleanup:
+    return status;
+}
+
+static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES],
+                            const ov_cells_options *how) {
     ovoid_status status = OVOID_OK;
     const double least = OV_MARCH_CUTOFF * j->options.isovalue;
     j->lead = fields[0]->count >= fields[1]->count ? 0 : 1;
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         OV_TRY(ov_field_check_ellipsoids(j->context, fields[n], j->options.isovalue));
-        OV_TRY(ov_shelf_create(j->context, fields[n], n == j->lead ? most : SHELF, least,
+        OV_TRY(ov_field_place(j->context, fields[n]));
+        OV_TRY(ov_shelf_create(j->context, fields[n], n == j->lead ? how->most : SHELF, least,
                                &j->shelf[n]));
     }
+    if (how->repeat)
+        OV_TRY(prepare_images(j, how->repeat));
     j->cells = j->shelf[j->lead].cut.count;
     j->cell = ov_alloc(j->context, j->cells, sizeof *j->cell, "cells of a surface");
     j->late = ov_alloc(j->context, j->cells, sizeof *j->late, "cells of a surface");
@@ -69,20 +101,21 @@ cleanup:
 /* The terms that make the surfaces in a cell and its halo what they are. */
 static ovoid_status take_terms(job *j, size_t c, ov_survey_terms *terms) {
     const double reach = j->options.halo + OV_SURVEY_ROOM * j->options.spacing;
-    ov_box box = *box_of(j, c);
+    ov_box box = box_of(j, c);
     for (size_t k = 0; k < 3; ++k) {
         box.low[k] -= reach;
         box.high[k] += reach;
     }
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
-        const ovoid_status status = ov_shelf_take(j->context, &j->shelf[n], &box, &j->body[n],
-                                                  &j->count[n], &j->capacity[n]);
+        const ovoid_status status =
+            ov_shelf_take(j->context, &j->shelf[n], &j->images, &box, &j->taken[n]);
         if (status != OVOID_OK)
             return status;
-        terms->body[n] = j->body[n];
-        terms->count[n] = j->count[n];
+        terms->body[n] = j->taken[n].body;
+        terms->count[n] = j->taken[n].count;
     }
     j->options.cell = (uint32_t)c;
+    j->options.image = j->images.count > 1 ? j->taken[0].image : NULL;
     return OVOID_OK;
 }
 
@@ -95,12 +128,12 @@ static void forget_fars(ov_survey_cell *cell) {
 }
 
 static ovoid_status survey(job *j, size_t c, ov_survey_cell *cell) {
-    const ov_box *const box = box_of(j, c);
+    const ov_box box = box_of(j, c);
     ov_survey_terms terms;
     const ovoid_status status = take_terms(j, c, &terms);
     return status != OVOID_OK
                ? status
-               : ov_survey_bodies(j->context, &j->options, &terms, box->low, box->high, cell);
+               : ov_survey_bodies(j->context, &j->options, &terms, box.low, box.high, cell);
 }
 
 /* Cells with too many points that are far, for now, are left for later. */
@@ -122,12 +155,12 @@ cleanup:
 /* Where an outer surface was taken for what it is not. */
 static ovoid_status correct(job *j, size_t c) {
     ovoid_status status = OVOID_OK;
-    const ov_box *const box = box_of(j, c);
+    const ov_box box = box_of(j, c);
     ov_survey_terms terms;
     if (ov_survey_holds(&j->standing, &j->cell[c], c))
         return OVOID_OK;
     OV_TRY(take_terms(j, c, &terms));
-    OV_TRY(ov_survey_again(j->context, &j->options, &terms, box->low, box->high, &j->standing,
+    OV_TRY(ov_survey_again(j->context, &j->options, &terms, box.low, box.high, &j->standing,
                            &j->cell[c]));
 cleanup:
     return status;
@@ -168,37 +201,91 @@ static void bound_far(const job *j, ov_survey_far *far) {
         }
 }
 
-/* Those which something in cell c may be nearer to. */
-static size_t choose_fars(const job *j, size_t c, ov_survey_far *const *far, size_t count,
-                          ov_survey_far **chosen) {
-    size_t found = 0;
-    for (size_t k = 0; k < count; ++k)
-        if (far[k]->cell != c && j->cell[c].side[1 - far[k]->side].pieces > 0 &&
-            distance_to(box_of(j, c), far[k]->at) < far[k]->distance)
-            chosen[found++] = far[k];
-    return found;
+/* A point that is far, as it lies to the unit from an image of it. */
+typedef struct sought {
+    ov_survey_far far;
+    size_t of; /* the point */
+} sought;
+
+typedef struct seeker {
+    ov_survey_far *const *far;
+    size_t count;
+    sought *found;
+    ov_survey_far **list; /* of what was found */
+    size_t founds, capacity, list_capacity;
+} seeker;
+
+static ovoid_status add_sought(const job *j, size_t point, const double at[3], seeker *s) {
+    const ovoid_status status = ov_grow(j->context, &s->found, &s->capacity, s->founds + 1,
+                                        sizeof *s->found, "points that are far");
+    if (status != OVOID_OK)
+        return status;
+    s->found[s->founds] = (sought){.far = *s->far[point], .of = point};
+    memcpy(s->found[s->founds++].far.at, at, 3 * sizeof *at);
+    return OVOID_OK;
 }
 
-/* Looks for these points in all cells. chosen: room for as many. */
-static ovoid_status seek(job *j, ov_survey_far *const *far, size_t count, ov_survey_far **chosen) {
+/* Those which something in cell c, or in an image of it, may be nearer to. */
+static ovoid_status choose_fars(const job *j, size_t c, seeker *s) {
     ovoid_status status = OVOID_OK;
+    const ov_box box = box_of(j, c);
+    s->founds = 0;
+    for (size_t k = 0; k < s->count; ++k) {
+        const ov_survey_far *const far = s->far[k];
+        if (j->cell[c].side[1 - far->side].pieces == 0)
+            continue;
+        if (far->cell != c && distance_to(&box, far->at) < far->distance)
+            OV_TRY(add_sought(j, k, far->at, s));
+        for (size_t g = 1; g < j->images.count; ++g) {
+            double at[3];
+            ov_rigid_move(&j->back[g], far->at, at);
+            if (distance_to(&box, at) < far->distance)
+                OV_TRY(add_sought(j, k, at, s));
+        }
+    }
+    OV_TRY(ov_grow(j->context, &s->list, &s->list_capacity, s->founds + 1, sizeof *s->list,
+                   "points that are far"));
+    for (size_t n = 0; n < s->founds; ++n)
+        s->list[n] = &s->found[n].far;
+cleanup:
+    return status;
+}
+
+/* Looks for these points in cell c. */
+static ovoid_status seek_in(job *j, size_t c, seeker *s) {
+    ovoid_status status = OVOID_OK;
+    const ov_box box = box_of(j, c);
+    ov_survey_terms terms;
+    OV_TRY(choose_fars(j, c, s));
+    if (s->founds == 0)
+        return OVOID_OK;
+    OV_TRY(take_terms(j, c, &terms));
+    OV_TRY(ov_survey_seek(j->context, &j->options, &terms, box.low, box.high, &j->standing,
+                          &j->cell[c], s->list, s->founds));
+    for (size_t n = 0; n < s->founds; ++n) {
+        ov_survey_far *const far = s->far[s->found[n].of];
+        far->distance = fmin(far->distance, s->found[n].far.distance);
+    }
+cleanup:
+    return status;
+}
+
+/* Looks for these points in all cells. */
+static ovoid_status seek(job *j, ov_survey_far *const *far, size_t count) {
+    ovoid_status status = OVOID_OK;
+    seeker s = {.far = far, .count = count};
     for (size_t k = 0; k < count; ++k) {
         OV_TRY(ov_progress_ask(j->context));
         if (isinf(far[k]->distance))
             bound_far(j, far[k]);
     }
     for (size_t c = 0; c < j->cells; ++c) {
-        const ov_box *const box = box_of(j, c);
-        ov_survey_terms terms;
         OV_TRY(ov_progress_step(j->context, c, j->cells));
-        const size_t found = choose_fars(j, c, far, count, chosen);
-        if (found == 0)
-            continue;
-        OV_TRY(take_terms(j, c, &terms));
-        OV_TRY(ov_survey_seek(j->context, &j->options, &terms, box->low, box->high, &j->standing,
-                              &j->cell[c], chosen, found));
+        OV_TRY(seek_in(j, c, &s));
     }
 cleanup:
+    free(s.found);
+    free(s.list);
     return status;
 }
 
@@ -206,28 +293,24 @@ cleanup:
 static ovoid_status settle(job *j, size_t first, size_t end) {
     ovoid_status status = OVOID_OK;
     size_t count = 0, next = 0;
-    ov_survey_far **far = NULL, **chosen = NULL;
+    ov_survey_far **far = NULL;
     for (size_t c = first; c < end; ++c)
         count += j->cell[c].fars;
     if (count == 0)
         return OVOID_OK;
     far = ov_alloc(j->context, count, sizeof *far, "points that are far");
-    chosen = ov_alloc(j->context, count, sizeof *chosen, "points that are far");
-    if (!far || !chosen) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
+    if (!far)
+        return OVOID_ERROR_MEMORY;
     for (size_t c = first; c < end; ++c)
         for (size_t k = 0; k < j->cell[c].fars; ++k)
             far[next++] = &j->cell[c].far[k];
-    OV_TRY(seek(j, far, count, chosen));
+    OV_TRY(seek(j, far, count));
     for (size_t k = 0; k < count; ++k)
         ov_survey_settle(far[k], &j->cell[far[k]->cell]);
     for (size_t c = first; c < end; ++c)
         forget_fars(&j->cell[c]);
 cleanup:
     free(far);
-    free(chosen);
     return status;
 }
 
@@ -306,20 +389,17 @@ static ovoid_status distances_of(job *j, const ov_survey_sums sums[OV_SURVEY_SID
     return OVOID_OK;
 }
 
-/* There are no images of it all. */
-static const ov_survey_images alone = {.count = 1};
-
 static ovoid_status find_distances(job *j, ovoid_measures *made) {
     ovoid_status status = OVOID_OK;
     ov_survey_total total = {0};
-    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total));
+    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &j->images, 0.0, &total));
     OV_TRY(check_outer(j, &total));
     ov_survey_total_destroy(&total);
-    OV_TRY(ov_survey_stand(j->context, j->cell, j->cells, &j->standing));
+    OV_TRY(ov_survey_stand(j->context, j->cell, j->cells, &j->images, &j->standing));
     OV_TRY(correct_all(j));
     OV_TRY(settle(j, 0, j->cells));
     OV_TRY(settle_late(j));
-    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total));
+    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &j->images, 0.0, &total));
     OV_TRY(distances_of(j, total.sums, &made->distances));
     OV_TRY(distances_of(j, total.sums_outer, &made->distances_outer));
     made->deviation = total.deviation;
@@ -330,11 +410,13 @@ cleanup:
 
 static ovoid_status find_contents(job *j, ovoid_measures *made) {
     ov_survey_total total = {0};
-    const ovoid_status status = ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total);
-    made->area = ov_pair_of(total.area[0], total.area[1]);
-    made->volume = ov_pair_of(total.volume[0], total.volume[1]);
-    made->area_outer = ov_pair_of(total.area_outer[0], total.area_outer[1]);
-    made->volume_outer = ov_pair_of(total.volume_outer[0], total.volume_outer[1]);
+    const ovoid_status status =
+        ov_survey_join(j->context, j->cell, j->cells, &j->images, 0.0, &total);
+    const double units = (double)j->images.count;
+    made->area = ov_pair_of(units * total.area[0], units * total.area[1]);
+    made->volume = ov_pair_of(units * total.volume[0], units * total.volume[1]);
+    made->area_outer = ov_pair_of(units * total.area_outer[0], units * total.area_outer[1]);
+    made->volume_outer = ov_pair_of(units * total.volume_outer[0], units * total.volume_outer[1]);
     made->components_original = total.components[0];
     made->components_sparse = total.components[1];
     made->outer_original = total.outer[0];
@@ -353,6 +435,7 @@ ovoid_status ov_measure_cells(ovoid_context *context, const ovoid_field *origina
     double meshing = 0.0;
     ovoid_measures made;
     job j = {.context = context,
+             .images = {.count = 1}, /* there are none, but for all of it */
              .fars_most = how->fars_most > 0 ? how->fars_most : FARS_MOST,
              .options = {.isovalue = o->isovalue,
                          .spacing = o->spacing,
@@ -364,7 +447,9 @@ ovoid_status ov_measure_cells(ovoid_context *context, const ovoid_field *origina
                          .meshing = &meshing}};
     ovoid_measures_init(&made, sizeof made);
     ov_progress_stage(context, "measure");
-    OV_TRY(prepare(&j, fields, how->most));
+    OV_TRY(prepare(&j, fields, how));
+    if (how->repeat && (*how->scattered = j.ends.scattered))
+        goto cleanup;
     OV_TRY(survey_all(&j));
     OV_TRY(check_surfaces(&j, empty));
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)

@@ -84,7 +84,7 @@ static double sample(const ovoid_mesh *from, const ovoid_mesh *to, double *pitch
         balls[t] = ball_of(to, t);
     for (size_t t = 0; t < from->triangles; ++t) {
         const ball own = ball_of(from, t);
-        if (!ov_mesh_is_outer(from, from->corners[3 * t]))
+        if (!ov_mesh_is_exposed(from, from->corners[3 * t]))
             continue;
         const size_t count = list_near(&own, balls, to->triangles, near);
         if (distance_of(own.centre, to, balls, near, count) + own.radius <= largest)
@@ -102,7 +102,7 @@ static double sample(const ovoid_mesh *from, const ovoid_mesh *to, double *pitch
 static double largest_of(const ovoid_mesh *mesh, const float *distance) {
     double largest = 0.0;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (ov_mesh_is_outer(mesh, v))
+        if (ov_mesh_is_exposed(mesh, v))
             largest = fmax(largest, distance[v]);
     return largest;
 }
@@ -268,7 +268,7 @@ static void test_hole(void **state) {
     make_hole(&holed, about, radius);
     ovoid_mesh *a = shape_mesh(context, &whole), *b = shape_mesh(context, &holed);
     double of_vertices;
-    a->component[0].outer = b->component[0].outer = true; /* which open ones are not */
+    a->component[0].exposed = b->component[0].exposed = true; /* which open ones are not */
     const ov_bound got = bound_of(context, a, b, &of_vertices);
     print_message("by vertices %.3g, at least %.6g, at most %.6g\n", of_vertices, got.least,
                   got.most);
@@ -289,7 +289,7 @@ static void test_ridge(void **state) {
     shape_add_square(&square, 1, 6.0, 5.0);
     test_check(context, ovoid_mesh_create(context, tent, NULL, 6, corners, 6, &a));
     ovoid_mesh *const b = shape_mesh(context, &square);
-    a->component[0].outer = b->component[0].outer = true;
+    a->component[0].exposed = b->component[0].exposed = true;
     expect_bound(context, a, b, "ridge", 0);
     shape_destroy(&square);
 }
@@ -349,7 +349,7 @@ static ovoid_mesh *soup(ovoid_context *context, test_random *random, size_t tria
     test_check(context,
                ovoid_mesh_create(context, xyz, NULL, 3 * triangles, corners, triangles, &mesh));
     for (size_t c = 0; c < mesh->components; ++c)
-        mesh->component[c].outer = c % 4 != 0;
+        mesh->component[c].exposed = c % 4 != 0;
     free(xyz);
     free(corners);
     return mesh;
@@ -421,7 +421,7 @@ static void test_parallel(void **state) {
         shape_add_square(&s[1], 50, 32.0, gaps[n]);
         ovoid_mesh *a = shape_mesh(context, &s[0]), *b = shape_mesh(context, &s[1]);
         double of_vertices;
-        a->component[0].outer = b->component[0].outer = true;
+        a->component[0].exposed = b->component[0].exposed = true;
         const ov_bound got = bound_of(context, a, b, &of_vertices);
         print_message("%g apart: from %.6g to %.6g, %zu triangles\n", gaps[n], got.least, got.most,
                       got.triangles);

@@ -154,19 +154,26 @@ static void a_grown_piece(void **state) {
     ov_judge_destroy(&judge);
 }
 
+enum { SHELL = 60 };
+
+/* Atoms on a sphere, and one in the middle that fills it. */
+static void shell_of_atoms(double radius, double filling, double xyzr[4 * (SHELL + 1)]) {
+    for (size_t i = 0; i < SHELL; ++i) {
+        const double z = 1.0 - (2.0 * (double)i + 1.0) / SHELL, turn = 2.399963 * (double)i;
+        const double rho = radius * sqrt(1.0 - z * z);
+        const double at[4] = {rho * cos(turn), rho * sin(turn), radius * z, 1.5};
+        memcpy(xyzr + 4 * i, at, sizeof at);
+    }
+    memset(xyzr + 4 * SHELL, 0, 3 * sizeof *xyzr);
+    xyzr[4 * SHELL + 3] = filling;
+}
+
 /* A cavity that the model fills: the outer surface is as it was, the whole one is not. */
 static void a_filled_cavity(void **state) {
     if (test_small()) /* a shell takes many atoms */
         skip();
-    enum { SHELL = 60 };
-    double xyzr[4 * (SHELL + 1)] = {0};
-    for (size_t i = 0; i < SHELL; ++i) {
-        const double z = 1.0 - (2.0 * (double)i + 1.0) / SHELL, turn = 2.399963 * (double)i;
-        const double rho = 4.5 * sqrt(1.0 - z * z);
-        const double at[4] = {rho * cos(turn), rho * sin(turn), 4.5 * z, 1.5};
-        memcpy(xyzr + 4 * i, at, sizeof at);
-    }
-    xyzr[4 * SHELL + 3] = 2.4; /* the filling, at the origin */
+    double xyzr[4 * (SHELL + 1)];
+    shell_of_atoms(4.5, 2.4, xyzr);
     ov_judge judge;
     judge_atoms(*state, xyzr, SHELL, 0.5, 1.0, &judge);
     ov_quadric *const quadrics = quadrics_of(xyzr, SHELL + 1, 0.5);
@@ -189,6 +196,39 @@ static void a_filled_cavity(void **state) {
     free(spots);
     free(quadrics);
     ov_judge_destroy(&judge);
+}
+
+/* A shell that lacks an atom, so that its inside is open by a neck that the lattice of 0.5 angstrom
+ * misses: it is told from a cavity all the same, and a model that fills it is off, at any spacing.
+ */
+static void a_cavity_that_is_open(void **state) {
+    if (test_small())
+        skip();
+    double xyzr[4 * (SHELL + 1)];
+    shell_of_atoms(5.15, 3.0, xyzr);
+    memmove(xyzr + 4 * (SHELL / 2), xyzr + 4 * (SHELL / 2 + 1), 4 * (SHELL / 2) * sizeof *xyzr);
+    const size_t atoms = SHELL - 1;
+    ov_quadric *const quadrics = quadrics_of(xyzr, atoms + 1, 0.5);
+    for (int fine = 0; fine < 2; ++fine) {
+        ov_judge judge;
+        ov_judgement got;
+        ov_spot *spots = NULL;
+        size_t count = 0;
+        memset(&judge, 0, sizeof judge);
+        test_check(*state, ov_judge_create(*state, xyzr, atoms, 0.5, 1.0, fine ? 0.2 : 0.5,
+                                           (ov_watch){0}, &judge));
+        assert_int_equal(judge.mesh->components, fine ? 1 : 2);
+        for (size_t c = 0; c < judge.mesh->components; ++c)
+            assert_true(judge.mesh->component[c].exposed);
+        test_check(*state,
+                   ov_judge_spots(&judge, quadrics, atoms + 1, 0.5, 1.0, 99, &got, &spots, &count));
+        print_message("deviation %g, %zu spots\n", got.deviation, count);
+        assert_true(got.deviation > 1.0);
+        assert_true(count > 0);
+        free(spots);
+        ov_judge_destroy(&judge);
+    }
+    free(quadrics);
 }
 
 typedef struct countdown {
@@ -443,6 +483,7 @@ int main(void) {
         cmocka_unit_test(a_missing_piece),
         cmocka_unit_test(a_grown_piece),
         cmocka_unit_test(a_filled_cavity),
+        cmocka_unit_test(a_cavity_that_is_open),
         cmocka_unit_test(the_last_model_is_forgotten),
         cmocka_unit_test(no_surface_of_the_original),
         cmocka_unit_test(no_surface_of_the_model),

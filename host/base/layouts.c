@@ -45,6 +45,7 @@ AT(ovoid_component, area, 16);
 AT(ovoid_component, outer, 32);
 AT(ovoid_component, euler, 36);
 AT(ovoid_component, closed, 40);
+AT(ovoid_component, exposed, 41);
 
 PROMISED(ovoid_distances, 5 * sizeof(double));
 PROMISED(ovoid_pair, 3 * sizeof(double));

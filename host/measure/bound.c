@@ -118,8 +118,8 @@ static ovoid_status keep(ovoid_context *context, bounding *b, fragments *to, con
     return status;
 }
 
-static bool is_outer(const ov_trail *trail, size_t k) {
-    return ov_mesh_component_of_triangle(trail->mesh, ov_trail_triangle(trail, k))->outer;
+static bool is_exposed(const ov_trail *trail, size_t k) {
+    return ov_mesh_component_of_triangle(trail->mesh, ov_trail_triangle(trail, k))->exposed;
 }
 
 static void raise_least(bounding *b, const float *squared, size_t count) {
@@ -144,7 +144,7 @@ static ovoid_status know_corners(ovoid_context *context, bounding *b, const ov_t
         if (asked != OVOID_OK)
             return asked;
         squared_of(from, k, squared, of);
-        if (is_outer(from, k))
+        if (is_exposed(from, k))
             raise_least(b, of, 3);
     }
     return OVOID_OK;
@@ -158,7 +158,7 @@ static ovoid_status collect(ovoid_context *context, bounding *b, const ov_trail 
         fragment p;
         float of[3];
         OV_TRY(ov_progress_turn(context, *k, from->triangles));
-        if (!is_outer(from, *k))
+        if (!is_exposed(from, *k))
             continue;
         squared_of(from, *k, squared, of);
         corners_of(b, from, *k, p.at);

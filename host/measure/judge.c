@@ -149,7 +149,7 @@ static bool is_judged(const ov_judge *judge, const double at[3]) {
 /* Whether a vertex counts; *outer: as one of an outer surface. */
 static bool counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, bool *outer) {
     double at[3];
-    *outer = ov_mesh_is_outer(mesh, vertex);
+    *outer = ov_mesh_is_exposed(mesh, vertex);
     if (!judge->in_region)
         return true;
     ov_mesh_at(mesh, vertex, at);

@@ -66,10 +66,10 @@ cleanup:
     return status;
 }
 
-static double largest_of_outer(const ovoid_mesh *mesh, const float *distance) {
+static double largest_of_exposed(const ovoid_mesh *mesh, const float *distance) {
     double largest = 0.0;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (ov_mesh_is_outer(mesh, v))
+        if (ov_mesh_is_exposed(mesh, v))
             largest = fmax(largest, distance[v]);
     return largest;
 }
@@ -87,7 +87,7 @@ static ovoid_status compare_vertices(ovoid_context *context, const ovoid_mesh *o
     }
     OV_TRY(ov_mesh_distances(context, original, sparse, false, &measures->distances, first, second,
                              &bound));
-    measures->deviation = fmax(largest_of_outer(original, first), largest_of_outer(sparse, second));
+    measures->deviation = fmax(largest_of_exposed(original, first), largest_of_exposed(sparse, second));
     measures->deviation_bound = fmax(bound.most, measures->deviation);
 cleanup:
     free(first);

@@ -1,6 +1,7 @@
 #include "measure/surveyor.h"
 
 #include "base/progress.h"
+#include "mesh/exposed.h"
 #include "mesh/union.h"
 
 #include <math.h>
@@ -351,6 +352,57 @@ cleanup:
     return status;
 }
 
+/* ---- necks ----------------------------------------------------------------------------------- */
+
+typedef struct necks {
+    ov_surveyor *surveyor;
+    const ov_sheet *sheet;
+    ov_survey_side *side;
+} necks;
+
+/* The same for a pair of vertices whichever comes first, and in each cell. */
+static uint64_t key_of_pair(const necks *all, uint32_t v, uint32_t w) {
+    const uint32_t vertex[2] = {v, w};
+    uint64_t key = 0;
+    for (size_t n = 0; n < 2; ++n) {
+        double at[3];
+        ov_mesh_at(all->sheet->mesh, vertex[n], at);
+        key += ov_survey_key(all->surveyor, at);
+    }
+    return key;
+}
+
+static ovoid_status add_neck(uint32_t v, uint32_t w, void *user) {
+    ovoid_status status = OVOID_OK;
+    const necks *const all = user;
+    const uint64_t key = key_of_pair(all, v, w);
+    const uint32_t piece[2] = {all->sheet->piece_of[v], all->sheet->piece_of[w]};
+    for (size_t n = 0; n < 2; ++n)
+        if (piece[n] != OV_NO_PIECE)
+            OV_TRY(ov_survey_add_key(all->surveyor->context, key, piece[n], &all->side->neck,
+                                     &all->side->necks, &all->side->neck_capacity));
+cleanup:
+    return status;
+}
+
+/* What hangs together in cell and halo, or in all of a sheet that has no halo, has no neck. */
+static ovoid_status find_necks(ov_surveyor *s, const ov_sheet *from, ov_survey_side *side) {
+    const ovoid_mesh *const mesh = from->mesh;
+    necks all = {.surveyor = s, .sheet = from, .side = side};
+    size_t sets = 0;
+    uint32_t *const set_of = ov_alloc(s->context, mesh->vertices, sizeof *set_of, "pieces");
+    if (!set_of)
+        return OVOID_ERROR_MEMORY;
+    ov_sheet_unite(from, s->options->halo > 0.0 ? OV_ZONE_HALO : OV_ZONE_BEYOND, set_of);
+    for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
+        if (set_of[v] != OV_NO_PIECE)
+            set_of[v] = set_of[v] == v ? (uint32_t)sets++ : set_of[set_of[v]];
+    const ovoid_status status = ov_mesh_near_sets(s->context, mesh, set_of, sets,
+                                                  OV_NECK * s->options->spacing, add_neck, &all);
+    free(set_of);
+    return status;
+}
+
 static ovoid_status record_sheet(ov_surveyor *s, size_t n, ov_survey_cell *cell) {
     ovoid_status status = OVOID_OK;
     const ov_sheet *const from = &s->sheet[n];
@@ -366,6 +418,7 @@ static ovoid_status record_sheet(ov_surveyor *s, size_t n, ov_survey_cell *cell)
     for (size_t v = 0; v < from->mesh->vertices; ++v)
         if (from->piece_of[v] != OV_NO_PIECE)
             OV_TRY(record_vertex(s, from, v, side));
+    OV_TRY(find_necks(s, from, side));
     if (s->options->sums)
         OV_TRY(ov_spans_mark(s, n, side));
     if (s->options->image)
@@ -521,6 +574,7 @@ void ov_survey_cell_destroy(ov_survey_cell *cell) {
         free(cell->side[n].spot_on);
         free(cell->side[n].mark);
         free(cell->side[n].asked);
+        free(cell->side[n].neck);
     }
     free(cell->far);
     *cell = (ov_survey_cell){0};

@@ -60,10 +60,13 @@ typedef struct ov_survey_side {
     ov_survey_seam *mark;  /* a few of the vertices that are in other cells' surroundings */
     ov_survey_seam *asked; /* such vertices of others, by surfaces (`piece`) that are not in the
                               cell, and were supposed to be outer ones */
-    size_t pieces, seams, ports, spots, marks, askings;
+    ov_survey_seam *neck;  /* by where two vertices are that are near to each other, and do not hang
+                              together as far as is known here: what both belong to, where it is in
+                              the cell */
+    size_t pieces, seams, ports, spots, marks, askings, necks;
     size_t missed; /* terms whose pieces could not be meshed, here and about */
     size_t seam_capacity, port_capacity, spot_capacity, spot_on_capacity, mark_capacity,
-        asked_capacity;
+        asked_capacity, neck_capacity;
 } ov_survey_side;
 
 /* A point whose distance is not known in its cell. */
@@ -181,7 +184,8 @@ typedef struct ov_survey_total {
     double hausdorff;                           /* of the whole surfaces' vertices, angstrom */
     double deviation; /* as in ovoid_measures, angstrom; both exact where there are no spots, or
                          some */
-    ov_spot *spot;    /* of outer surfaces, the worst of each neighbourhood, the worst first */
+    ov_spot *spot;    /* of exposed surfaces (mesh/exposed.h), the worst of each neighbourhood, the
+                         worst first */
     size_t spots;
 } ov_survey_total;
 

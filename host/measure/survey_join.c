@@ -20,12 +20,14 @@ typedef struct link {
 
 /* The pieces of one side, those of all cells one after the other. */
 typedef struct joint {
-    size_t pieces, seams, ports;
+    size_t pieces, seams, ports, necks;
     size_t *first;   /* of each cell */
-    uint32_t *whole; /* of each piece: the first one that it hangs together with */
+    uint32_t *whole; /* of each piece: the first one that it hangs together with, */
+    uint32_t *about; /* and the first one that it may hang together with by necks, too */
+    bool *exposed;   /* of each such, whether one of them is an outer one */
     double *volume;  /* of each such, */
     double *at;      /* counted from a vertex of it */
-    ov_survey_seam *seam;
+    ov_survey_seam *seam, *neck;
     ov_survey_port *port;
     link *link; /* between what hangs together in the unit */
     size_t links, link_capacity;
@@ -35,6 +37,9 @@ typedef struct joint {
 static void joint_destroy(joint *j) {
     free(j->first);
     free(j->whole);
+    free(j->about);
+    free(j->exposed);
+    free(j->neck);
     free(j->volume);
     free(j->at);
     free(j->seam);
@@ -56,17 +61,22 @@ static ovoid_status joint_create(ovoid_context *context, const ov_survey_cell *c
         j->pieces += cells[c].side[n].pieces;
         j->seams += cells[c].side[n].seams;
         j->ports += cells[c].side[n].ports;
+        j->necks += cells[c].side[n].necks;
     }
     if (j->pieces >= UINT32_MAX)
         return ov_fail(context, OVOID_ERROR_LIMIT, "a surface of %zu pieces", j->pieces);
     j->first = ov_alloc(context, count, sizeof *j->first, "pieces of a surface");
     j->whole = ov_alloc(context, j->pieces, sizeof *j->whole, "pieces of a surface");
+    j->about = ov_alloc(context, j->pieces, sizeof *j->about, "pieces of a surface");
+    j->exposed = ov_alloc(context, j->pieces, sizeof *j->exposed, "pieces of a surface");
     j->volume = ov_alloc(context, j->pieces, sizeof *j->volume, "pieces of a surface");
     j->at = ov_alloc(context, j->pieces, 3 * sizeof *j->at, "pieces of a surface");
     j->seam = ov_alloc(context, j->seams, sizeof *j->seam, "seams between parts");
     j->port = ov_alloc(context, j->ports, sizeof *j->port, "seams between units");
-    return j->first && j->whole && j->volume && j->at && j->seam && j->port ? OVOID_OK
-                                                                            : OVOID_ERROR_MEMORY;
+    j->neck = ov_alloc(context, j->necks, sizeof *j->neck, "necks between pieces");
+    const bool made = j->first && j->whole && j->about && j->exposed && j->volume && j->at &&
+                      j->seam && j->port && j->neck;
+    return made ? OVOID_OK : OVOID_ERROR_MEMORY;
 }
 
 /* Adds what a piece has of a volume that counts from this place. */
@@ -76,9 +86,23 @@ static void add_volume(const ov_survey_piece *piece, const double from[3], doubl
         *volume += (piece->at[k] - from[k]) * piece->vector[k] / 3.0;
 }
 
+static void copy_seams(const ov_survey_seam *seams, size_t count, size_t first,
+                       ov_survey_seam *to) {
+    for (size_t k = 0; k < count; ++k)
+        to[k] = (ov_survey_seam){.key = seams[k].key, .piece = (uint32_t)first + seams[k].piece};
+}
+
+/* Those with the same key. */
+static void unite_by_key(ov_survey_seam *seams, size_t count, uint32_t *of) {
+    qsort(seams, count, sizeof *seams, by_key);
+    for (size_t k = 1; k < count; ++k)
+        if (seams[k].key == seams[k - 1].key)
+            ov_unite(of, seams[k].piece, seams[k - 1].piece);
+}
+
 /* Pieces that have a vertex in common are parts of one. */
 static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) {
-    size_t piece = 0, seam = 0, port = 0;
+    size_t piece = 0, seam = 0, port = 0, neck = 0;
     for (size_t c = 0; c < count; ++c) {
         const ov_survey_side *const side = &cells[c].side[n];
         j->first[c] = piece;
@@ -86,18 +110,16 @@ static void join(const ov_survey_cell *cells, size_t count, size_t n, joint *j) 
             j->port[port] = side->port[k];
             j->port[port].piece += (uint32_t)piece;
         }
-        for (size_t k = 0; k < side->seams; ++k)
-            j->seam[seam++] = (ov_survey_seam){.key = side->seam[k].key,
-                                               .piece = (uint32_t)piece + side->seam[k].piece};
+        copy_seams(side->seam, side->seams, piece, j->seam + seam);
+        copy_seams(side->neck, side->necks, piece, j->neck + neck);
+        seam += side->seams;
+        neck += side->necks;
         for (size_t k = 0; k < side->pieces; ++k, ++piece) {
             j->whole[piece] = (uint32_t)piece;
             memcpy(j->at + 3 * piece, side->piece[k].at, sizeof side->piece[k].at);
         }
     }
-    qsort(j->seam, j->seams, sizeof *j->seam, by_key);
-    for (size_t k = 1; k < j->seams; ++k)
-        if (j->seam[k].key == j->seam[k - 1].key)
-            ov_unite(j->whole, j->seam[k].piece, j->seam[k - 1].piece);
+    unite_by_key(j->seam, j->seams, j->whole);
 }
 
 /* Of the vertices at seams the one that is what image the port leads to has where the port is: near
@@ -295,6 +317,20 @@ static bool is_outer(joint *j, size_t piece) {
     return j->volume[ov_union_first(j->whole, (uint32_t)piece)] > 0.0;
 }
 
+/* When volumes are known. */
+static void expose(joint *j) {
+    for (size_t p = 0; p < j->pieces; ++p)
+        j->about[p] = ov_union_first(j->whole, (uint32_t)p);
+    unite_by_key(j->neck, j->necks, j->about);
+    for (size_t p = 0; p < j->pieces; ++p)
+        if (is_outer(j, p))
+            j->exposed[ov_union_first(j->about, (uint32_t)p)] = true;
+}
+
+static bool is_exposed(joint *j, size_t piece) {
+    return j->exposed[ov_union_first(j->about, (uint32_t)piece)];
+}
+
 static void add_sums(const ov_survey_sums *one, ov_survey_sums *all) {
     all->weight += one->weight;
     all->mean += one->mean;
@@ -315,13 +351,14 @@ static void add_side(const ov_survey_cell *cells, size_t count, size_t n, joint 
             total->components[n] += copies;
             total->hausdorff = fmax(total->hausdorff, piece->furthest);
             add_sums(&piece->whole, &total->sums[n]);
+            if (is_exposed(j, at))
+                total->deviation = fmax(total->deviation, piece->furthest);
             if (!outer)
                 continue;
             total->area_outer[n] += piece->area;
             total->volume_outer[n] += first ? j->volume[at] : 0.0;
             total->outer[n] += copies;
             add_sums(&piece->outer, &total->sums_outer[n]);
-            total->deviation = fmax(total->deviation, piece->furthest);
         }
 }
 
@@ -331,7 +368,7 @@ static ovoid_status add_spots(ovoid_context *context, const ov_survey_cell *cell
     for (size_t c = 0; c < count; ++c) {
         const ov_survey_side *const side = &cells[c].side[n];
         for (size_t k = 0; k < side->spots; ++k) {
-            if (!is_outer(j, j->first[c] + side->spot_on[k]))
+            if (!is_exposed(j, j->first[c] + side->spot_on[k]))
                 continue;
             OV_TRY(ov_grow(context, &total->spot, capacity, total->spots + 1, sizeof *total->spot,
                            "spots"));
@@ -356,6 +393,7 @@ ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
         }
         if (status == OVOID_OK) {
             add_volumes(cells, count, n, images, &j);
+            expose(&j);
             add_side(cells, count, n, &j, &made);
             status = add_spots(context, cells, count, n, &j, &capacity, &made);
         }

@@ -3,6 +3,7 @@
 #include "field/bricks.h"
 #include "mesh/brick_grid.h"
 #include "mesh/case_table.h"
+#include "mesh/exposed.h"
 #include "mesh/mesh.h"
 #include "mesh/specks.h"
 
@@ -931,7 +932,7 @@ static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh)
         adopt_device(m, *mesh);
     (*mesh)->edge = m->edge_of;
     m->edge_of = NULL;
-    return OVOID_OK;
+    return m->origin ? OVOID_OK : ov_mesh_expose(context, *mesh);
 }
 
 /* Where there are so many more pieces than ones with a surface, small pieces are tried, and ones of

@@ -1,4 +1,5 @@
 #include "mesh/mesh.h"
+#include "mesh/exposed.h"
 #include "mesh/union.h"
 
 #include <math.h>
@@ -311,6 +312,8 @@ ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
         OV_TRY(check_edges(context, mesh));
     OV_TRY(ov_progress_ask(context));
     OV_TRY(measure_components(context, mesh));
+    OV_TRY(ov_progress_ask(context));
+    OV_TRY(ov_mesh_expose(context, mesh));
 cleanup:
     return status;
 }

@@ -76,8 +76,9 @@ static inline const ovoid_component *ov_mesh_component_of_triangle(const ovoid_m
     return &mesh->component[mesh->component_of[mesh->corners[3 * triangle]]];
 }
 
-static inline bool ov_mesh_is_outer(const ovoid_mesh *mesh, size_t vertex) {
-    return mesh->component[mesh->component_of[vertex]].outer;
+/* Whether a vertex is of an outer surface, or of a cavity that may be open (exposed.h). */
+static inline bool ov_mesh_is_exposed(const ovoid_mesh *mesh, size_t vertex) {
+    return mesh->component[mesh->component_of[vertex]].exposed;
 }
 
 /* Area and volume of all components or of the outer ones alone. */

@@ -43,7 +43,8 @@ typedef struct ovoid_measures {
     double deviation; /* largest distance of a vertex of either outer surface from the other whole
                          surface, angstrom: unlike the Hausdorff distance of the outer surfaces it
                          does not jump when the neck of a tunnel opens or closes, and unlike that of
-                         the whole ones not with a small cavity. What a tolerance is about. */
+                         the whole ones not with a small cavity. What a tolerance is about.
+                         Exposed cavities (ovoid_component) count as outer. */
     double seconds_mesh, seconds_distances;
     /* No point of a triangle of either outer surface's mesh is farther than this from the other
      * whole mesh, angstrom; NAN where that is not known: without distances, and cell by cell. */

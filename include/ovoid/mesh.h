@@ -70,6 +70,8 @@ typedef struct ovoid_component { /* 48 bytes */
     bool outer;    /* encloses matter: its volume is positive */
     int32_t euler; /* vertices - edges + triangles: 2 - 2 genus where closed */
     bool closed;   /* every edge has two triangles, oppositely oriented */
+    bool exposed;  /* outer, or a cavity that comes within two lattice steps of an exposed one: a
+                      neck may be open there that is too narrow for the mesh */
 } ovoid_component;
 OVOID_API size_t ovoid_mesh_components(const ovoid_mesh *mesh);
 OVOID_API const ovoid_component *ovoid_mesh_component(const ovoid_mesh *mesh, size_t index);

@@ -1,0 +1,173 @@
+#include "mesh/exposed.h"
+
+#include "mesh/union.h"
+#include "neighbours/neighbours.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* ---- vertices near to each other ------------------------------------------------------------- */
+
+/* The vertices that are not of the largest set, and the lattice cells in which a vertex may be near
+ * to one of them: most vertices are in none, which is soon seen. */
+typedef struct minority {
+    const ovoid_mesh *mesh;
+    const uint32_t *set_of;
+    uint32_t largest;
+    size_t count;
+    ov_grid grid;
+    ov_cells about;
+} minority;
+
+static void minority_destroy(minority *m) {
+    ov_grid_destroy(&m->grid);
+    ov_cells_destroy(&m->about);
+}
+
+static ovoid_status find_largest(ovoid_context *context, minority *m, size_t sets) {
+    size_t known = 0;
+    size_t *const size = ov_alloc(context, sets, sizeof *size, "pieces of a surface");
+    if (!size)
+        return OVOID_ERROR_MEMORY;
+    for (size_t v = 0; v < m->mesh->vertices; ++v)
+        if (m->set_of[v] != OV_NO_SET) {
+            ++size[m->set_of[v]];
+            ++known;
+        }
+    for (size_t s = 0; s < sets; ++s)
+        if (size[s] > size[m->largest])
+            m->largest = (uint32_t)s;
+    m->count = known - size[m->largest];
+    free(size);
+    return OVOID_OK;
+}
+
+static bool is_minor(const minority *m, size_t v) {
+    return m->set_of[v] != OV_NO_SET && m->set_of[v] != m->largest;
+}
+
+static void find_box(const minority *m, double low[3], double high[3]) {
+    for (size_t k = 0; k < 3; ++k) {
+        low[k] = INFINITY;
+        high[k] = -INFINITY;
+    }
+    for (size_t v = 0; v < m->mesh->vertices; ++v) {
+        double at[3];
+        if (!is_minor(m, v))
+            continue;
+        ov_mesh_at(m->mesh, v, at);
+        for (size_t k = 0; k < 3; ++k) {
+            low[k] = fmin(low[k], at[k]);
+            high[k] = fmax(high[k], at[k]);
+        }
+    }
+}
+
+/* The cell of a place and those about it. */
+static ovoid_status add_about(ovoid_context *context, minority *m, const double at[3]) {
+    ovoid_status status = OVOID_OK;
+    int32_t middle[3];
+    ov_cells_place(&m->about, at, middle);
+    for (int n = 0; n < 27 && status == OVOID_OK; ++n) {
+        const int32_t place[3] = {middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1,
+                                  middle[2] + n / 9 - 1};
+        uint32_t number;
+        bool added;
+        status = ov_cells_add(context, &m->about, place, &number, &added);
+    }
+    return status;
+}
+
+static ovoid_status gather(ovoid_context *context, minority *m, double reach) {
+    ovoid_status status = OVOID_OK;
+    double low[3], high[3], at[3];
+    find_box(m, low, high);
+    OV_TRY(ov_grid_create(context, low, high, reach, m->count, m->mesh->vertices, &m->grid));
+    OV_TRY(ov_cells_create(context, low, m->grid.cells.edge, m->count, &m->about));
+    for (size_t v = 0; v < m->mesh->vertices; ++v) {
+        if (!is_minor(m, v))
+            continue;
+        ov_mesh_at(m->mesh, v, at);
+        OV_TRY(ov_grid_add(context, &m->grid, at, (uint32_t)v));
+        OV_TRY(add_about(context, m, at));
+    }
+cleanup:
+    return status;
+}
+
+static ovoid_status tell(const minority *m, uint32_t v, const double at[3], ov_near_found found,
+                         void *user) {
+    ovoid_status status = OVOID_OK;
+    uint32_t near[2 * OV_NEAR_MAX];
+    const size_t count = ov_grid_near(&m->grid, at, UINT32_MAX, near);
+    for (size_t n = 0; n < count && status == OVOID_OK; ++n)
+        if (m->set_of[near[n]] != m->set_of[v])
+            status = found(v, near[n], user);
+    return status;
+}
+
+ovoid_status ov_mesh_near_sets(ovoid_context *context, const ovoid_mesh *mesh,
+                               const uint32_t *set_of, size_t sets, double reach,
+                               ov_near_found found, void *user) {
+    ovoid_status status = OVOID_OK;
+    minority m = {.mesh = mesh, .set_of = set_of};
+    if (sets < 2)
+        return OVOID_OK;
+    OV_TRY(find_largest(context, &m, sets));
+    if (m.count == 0)
+        goto cleanup;
+    OV_TRY(gather(context, &m, reach));
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        double at[3];
+        int32_t place[3];
+        if (set_of[v] == OV_NO_SET)
+            continue;
+        ov_mesh_at(mesh, v, at);
+        ov_cells_place(&m.about, at, place);
+        if (ov_cells_find(&m.about, place) != OV_NO_CELL)
+            OV_TRY(tell(&m, (uint32_t)v, at, found, user));
+    }
+cleanup:
+    minority_destroy(&m);
+    return status;
+}
+
+/* ---- components ------------------------------------------------------------------------------ */
+
+typedef struct joining {
+    const ovoid_mesh *mesh;
+    uint32_t *of; /* of each component */
+} joining;
+
+static ovoid_status join(uint32_t v, uint32_t w, void *user) {
+    const joining *const j = user;
+    ov_unite(j->of, j->mesh->component_of[v], j->mesh->component_of[w]);
+    return OVOID_OK;
+}
+
+static void mark(const joining *j, ovoid_mesh *mesh) {
+    for (size_t c = 0; c < mesh->components; ++c)
+        if (mesh->component[c].outer)
+            mesh->component[ov_union_first(j->of, (uint32_t)c)].exposed = true;
+    for (size_t c = 0; c < mesh->components; ++c)
+        mesh->component[c].exposed = mesh->component[ov_union_first(j->of, (uint32_t)c)].exposed;
+}
+
+ovoid_status ov_mesh_expose(ovoid_context *context, ovoid_mesh *mesh) {
+    joining j = {.mesh = mesh};
+    for (size_t c = 0; c < mesh->components; ++c)
+        mesh->component[c].exposed = mesh->component[c].outer;
+    if (mesh->components < 2 || !(mesh->spacing > 0.0))
+        return OVOID_OK;
+    j.of = ov_alloc(context, mesh->components, sizeof *j.of, "components of a mesh");
+    if (!j.of)
+        return OVOID_ERROR_MEMORY;
+    for (size_t c = 0; c < mesh->components; ++c)
+        j.of[c] = (uint32_t)c;
+    const ovoid_status status = ov_mesh_near_sets(
+        context, mesh, mesh->component_of, mesh->components, OV_NECK * mesh->spacing, join, &j);
+    if (status == OVOID_OK)
+        mark(&j, mesh);
+    free(j.of);
+    return status;
+}

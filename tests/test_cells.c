@@ -233,26 +233,77 @@ static void what_is_far_apart(void **state) {
     }
 }
 
+static void measure_cells(ovoid_context *context, const pair *p, const ov_cells_options *how,
+                          ovoid_measures *measures) {
+    ovoid_field *original = NULL, *sparse = NULL;
+    ovoid_mesh_options meshing;
+    const ovoid_field *empty = NULL;
+    test_check(context, ovoid_field_of_molecule(context, p->molecule, 0.5, 1.0, &original));
+    test_check(context, ovoid_field_of_model(context, p->model, &sparse));
+    ovoid_mesh_options_init(&meshing, sizeof meshing);
+    meshing.isovalue = 1.0;
+    test_check(context,
+               ov_measure_cells(context, original, sparse, &meshing, how, &empty, measures));
+    ovoid_field_destroy(&original);
+    ovoid_field_destroy(&sparse);
+}
+
 /* Where only so much may be kept of what is far, cells are looked at again. */
 static void little_is_kept(void **state) {
     pair p = apart(*state, 40.0);
-    ovoid_field *original = NULL, *sparse = NULL;
-    ovoid_measure_options options = defaults();
+    const ovoid_measure_options options = defaults();
     ovoid_measures wanted, got;
-    ovoid_mesh_options meshing;
-    const ovoid_field *empty = NULL;
     const ov_cells_options how = {.most = 60, .distances = true, .fars_most = 5000};
     test_skip_simulated(*state);
     test_check(*state, measure(*state, &p, &options, &wanted));
-    test_check(*state, ovoid_field_of_molecule(*state, p.molecule, 0.5, 1.0, &original));
-    test_check(*state, ovoid_field_of_model(*state, p.model, &sparse));
-    ovoid_mesh_options_init(&meshing, sizeof meshing);
-    meshing.isovalue = 1.0;
-    test_check(*state, ov_measure_cells(*state, original, sparse, &meshing, &how, &empty, &got));
+    measure_cells(*state, &p, &how, &got);
     expect_same(&got, &wanted);
-    ovoid_field_destroy(&original);
-    ovoid_field_destroy(&sparse);
     pair_destroy(&p);
+}
+
+static void expect_identical(ovoid_measures a, ovoid_measures b) {
+    a.seconds_mesh = b.seconds_mesh;
+    a.seconds_distances = b.seconds_distances;
+    assert_memory_equal(&a, &b, sizeof a);
+}
+
+/* Surfaces that are kept for a second look change nothing: of all cells, of some, of none. */
+static void kept_surfaces_change_nothing(void **state) {
+    test_skip_simulated(*state);
+    for (int k = 0; k < 2; ++k) {
+        pair p = k == 0 ? apart(*state, 25.0) : random_pair(*state, 4, test_size(700, 300), 0.8);
+        ov_cells_options how = {.most = 60, .distances = true};
+        ovoid_measures all, some, none;
+        measure_cells(*state, &p, &how, &all);
+        how.kept_most = (size_t)1 << 20;
+        measure_cells(*state, &p, &how, &some);
+        how.kept_most = 1;
+        measure_cells(*state, &p, &how, &none);
+        expect_identical(all, some);
+        expect_identical(all, none);
+        pair_destroy(&p);
+    }
+}
+
+/* Nor does it how many look at cells side by side. */
+static void hands_change_nothing(void **state) {
+    test_skip_simulated(*state);
+    for (int k = 0; k < 2; ++k) {
+        pair p = k == 0 ? apart(*state, 25.0) : random_pair(*state, 6, test_size(700, 300), 0.8);
+        ov_cells_options how = {.most = 40, .distances = true, .hands = 1};
+        ovoid_measures alone, several;
+        measure_cells(*state, &p, &how, &alone);
+        for (how.hands = 2; how.hands <= 5; how.hands += 3)
+            for (int kept = 0; kept < 2; ++kept) {
+                how.kept_most = kept ? (size_t)1 << 20 : 0;
+                measure_cells(*state, &p, &how, &several);
+                expect_identical(several, alone);
+            }
+        how.fars_most = 2000;
+        measure_cells(*state, &p, &how, &several);
+        expect_same(&several, &alone);
+        pair_destroy(&p);
+    }
 }
 
 static void linear_vertices_and_spacings(void **state) {
@@ -369,7 +420,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cells_of_any_size),    cmocka_unit_test(the_inside_of_a_shell),
         cmocka_unit_test(a_neck_between_cells), cmocka_unit_test(what_is_far_apart),
-        cmocka_unit_test(little_is_kept),       cmocka_unit_test(linear_vertices_and_spacings),
+        cmocka_unit_test(little_is_kept),       cmocka_unit_test(kept_surfaces_change_nothing),
+        cmocka_unit_test(hands_change_nothing), cmocka_unit_test(linear_vertices_and_spacings),
         cmocka_unit_test(far_from_the_origin),  cmocka_unit_test(without_a_surface),
         cmocka_unit_test(atoms_in_one_place),   cmocka_unit_test(stops_anywhere),
     };

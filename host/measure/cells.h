@@ -1,6 +1,7 @@
 /*
- * Measures cell by cell: what ov_measure_meshes() says of two whole meshes, in the memory of a
- * cell and some bytes for each atom.
+ * Measures cell by cell: what ov_measure_meshes() says of two whole meshes, in the memory of those
+ * cells that are looked at side by side, a fixed amount for surfaces that are kept for a second
+ * look, and some bytes for each atom.
  */
 #ifndef OV_CELLS_H
 #define OV_CELLS_H
@@ -39,7 +40,9 @@ ovoid_status ov_shelf_take(ovoid_context *context, const ov_shelf *shelf,
 typedef struct ov_cells_options {
     size_t most;      /* terms of a cell, of the field that has more of them */
     bool distances;   /* else those stay unknown */
+    size_t hands;     /* threads that look at cells side by side; 0: some (hands.h) */
     size_t fars_most; /* points that are kept for a look into other cells, in tests; 0: some */
+    size_t kept_most; /* bytes of cells' surfaces that are kept, in tests; 0: some */
     const ov_repeat *repeat; /* the fields are those of the unit that this repeats, and what is
                                 measured is all of it; NULL: they are all there is */
     bool *scattered;         /* gets whether this cannot be: nothing was measured */

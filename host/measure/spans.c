@@ -190,13 +190,13 @@ static uint8_t stands_at(const ov_sheet *at, size_t triangle) {
     return at->stands[at->group_of[at->mesh->corners[3 * triangle]]];
 }
 
-typedef enum choice { SOURCES, TARGETS, OUTER_SOURCES, OUTER_TARGETS, OTHER_TARGETS } choice;
+typedef enum choice { SOURCES, TARGETS, OUTER_TARGETS, OTHER_TARGETS } choice;
 
 /* Those in the cell, which are measured from, or those whose places are known, which are measured
  * to: of the whole surface, of what is known of the outer one, or of what is left. */
 static ovoid_status choose(ov_surveyor *s, size_t n, choice what, ov_trail *trail) {
     const ov_sheet *const at = &s->sheet[n];
-    const bool from = what == SOURCES || what == OUTER_SOURCES;
+    const bool from = what == SOURCES;
     const bool all = what == SOURCES || what == TARGETS;
     bool *const chosen = ov_alloc(s->context, at->mesh->triangles, sizeof *chosen, "triangles");
     if (!chosen)
@@ -380,46 +380,74 @@ static bool is_all_outer(const ov_sheet *at) {
     return true;
 }
 
+/* Whether point k of what is measured from is of an outer component. */
+static bool is_outer_site(const ov_surveyor *s, const span *of, size_t k) {
+    const ov_sheet *const at = &s->sheet[of->side];
+    const size_t vertices = of->from->vertices;
+    return k < vertices
+               ? at->stands[at->group_of[ov_trail_vertex(of->from, k)]] == OV_STANDS_OUTER
+               : stands_at(at, ov_trail_triangle(of->from, k - vertices)) == OV_STANDS_OUTER;
+}
+
 /* From distances to the whole other surface to those from its outer components: most are the same.
  */
-static ovoid_status leave_others_out(ov_surveyor *s, const span *of, float *squared) {
+static ovoid_status leave_others_out(ov_surveyor *s, const span *of, const ov_sites *sites,
+                                     float *squared) {
     ovoid_status status = OVOID_OK;
     const size_t other = 1 - of->side;
-    const ov_sites sites = {.count = of->from->vertices + of->from->triangles, .trail = of->from};
-    bool *near = NULL;
-    if (is_all_outer(&s->sheet[other]))
-        return OVOID_OK;
-    near = ov_alloc(s->context, sites.count, sizeof *near, "distances");
+    bool *const near = ov_alloc(s->context, sites->count, sizeof *near, "distances");
     if (!near)
         return OVOID_ERROR_MEMORY;
-    OV_TRY(find_others(s, other, &sites, squared, near));
+    OV_TRY(find_others(s, other, sites, squared, near));
+    for (size_t k = 0; k < sites->count; ++k)
+        near[k] = near[k] && is_outer_site(s, of, k);
     OV_TRY(measure_again(s, other, of->from, near, squared));
 cleanup:
     free(near);
     return status;
 }
 
-/* From side n to the other surface (whole), and to its outer components. */
-static ovoid_status span_sides(ov_surveyor *s, size_t n, bool whole, ov_survey_cell *cell) {
+/* How far what is measured from is from all of the other surface: found once. */
+static ovoid_status find_squared(ov_surveyor *s, size_t n, const ov_sites *sites) {
+    if (s->squared[n])
+        return OVOID_OK;
+    s->squared[n] = ov_alloc(s->context, sites->count, sizeof *s->squared[n], "distances");
+    if (!s->squared[n])
+        return OVOID_ERROR_MEMORY;
+    return measure_sites(s, 1 - n, TARGETS, sites, s->squared[n]);
+}
+
+static bool is_in_cell(const ov_surveyor *s, size_t n) {
+    return s->sheet[n].mesh && s->sheet[n].pieces > 0;
+}
+
+/* From side n to the other surface, and, in a copy of these distances, to its outer components
+ * unless they are all there is; *squared: NULL where the whole surface will do. */
+static ovoid_status find_spans(ov_surveyor *s, size_t n, bool outer, span *of, float **squared) {
+    ovoid_status status = OVOID_OK;
+    const ov_sites sites = {.count = of->from->vertices + of->from->triangles, .trail = of->from};
+    OV_TRY(find_squared(s, n, &sites));
+    of->squared = s->squared[n];
+    if (!outer || is_all_outer(&s->sheet[1 - n]))
+        return OVOID_OK;
+    *squared = ov_copy(s->context, s->squared[n], sites.count, sizeof **squared, "distances");
+    if (!*squared)
+        return OVOID_ERROR_MEMORY;
+    of->squared = *squared;
+    OV_TRY(leave_others_out(s, of, &sites, *squared));
+cleanup:
+    return status;
+}
+
+static ovoid_status span_sides(ov_surveyor *s, size_t n, bool outer, ov_survey_cell *cell) {
     ovoid_status status = OVOID_OK;
     const ov_sheet *const other = &s->sheet[1 - n];
     ov_trail from = {0};
-    span of = {.side = n, .from = &from, .reach = s->options->halo, .cell = cell};
+    span of = {.side = n, .outer = outer, .from = &from, .cell = cell};
     float *squared = NULL;
-    OV_TRY(choose(s, n, whole ? SOURCES : OUTER_SOURCES, &from));
-    const ov_sites sites = {.count = from.vertices + from.triangles, .trail = &from};
-    of.squared = squared = ov_alloc(s->context, sites.count, sizeof *squared, "distances");
-    if (!squared) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    OV_TRY(measure_sites(s, 1 - n, whole ? TARGETS : OUTER_TARGETS, &sites, squared));
-    if (whole) {
-        OV_TRY(add_sites(s, &of));
-        OV_TRY(leave_others_out(s, &of, squared));
-    }
-    of.outer = true;
-    of.reach = other->mesh ? other->reach : s->options->halo;
+    of.reach = outer && other->mesh ? other->reach : s->options->halo;
+    OV_TRY(choose(s, n, SOURCES, &from));
+    OV_TRY(find_spans(s, n, outer, &of, &squared));
     OV_TRY(add_sites(s, &of));
 cleanup:
     ov_trail_destroy(&from);
@@ -427,14 +455,22 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_spans_add(ov_surveyor *s, bool whole, const ov_survey_standing *standing,
-                          ov_survey_cell *cell) {
+ovoid_status ov_spans_whole(ov_surveyor *s, ov_survey_cell *cell) {
+    ovoid_status status = OVOID_OK;
+    for (size_t n = 0; n < OV_SURVEY_SIDES && status == OVOID_OK; ++n)
+        if (is_in_cell(s, n))
+            status = span_sides(s, n, false, cell);
+    return status;
+}
+
+ovoid_status ov_spans_outer(ov_surveyor *s, const ov_survey_standing *standing,
+                            ov_survey_cell *cell) {
     ovoid_status status = OVOID_OK;
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         OV_TRY(find_groups(s, n, standing, &cell->side[n]));
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
-        if (s->sheet[n].mesh && s->sheet[n].pieces > 0)
-            OV_TRY(span_sides(s, n, whole, cell));
+        if (is_in_cell(s, n))
+            OV_TRY(span_sides(s, n, true, cell));
 cleanup:
     return status;
 }
@@ -459,7 +495,7 @@ static ovoid_status choose_own(ov_surveyor *s, size_t n, const ov_survey_standin
 
 /* Those of the points that are on the other side n, and want its outer components or all of it. */
 static ovoid_status seek_one(ov_surveyor *s, size_t n, bool outer, const ov_trail *to,
-                             ov_survey_far *const *far, size_t count) {
+                             ov_survey_far *far, size_t count) {
     ovoid_status status = OVOID_OK;
     size_t sites = 0;
     float *const xyz = ov_alloc(s->context, 3 * count, sizeof *xyz, "points that are far");
@@ -469,17 +505,17 @@ static ovoid_status seek_one(ov_surveyor *s, size_t n, bool outer, const ov_trai
         goto cleanup;
     }
     for (size_t k = 0; k < count; ++k)
-        if (far[k]->side != n && far[k]->outer == outer) {
+        if (far[k].side != n && far[k].outer == outer) {
             for (size_t axis = 0; axis < 3; ++axis)
-                xyz[3 * sites + axis] = (float)(far[k]->at[axis] - s->origin[axis]);
-            squared[sites++] = (float)(far[k]->distance * far[k]->distance);
+                xyz[3 * sites + axis] = (float)(far[k].at[axis] - s->origin[axis]);
+            squared[sites++] = (float)(far[k].distance * far[k].distance);
         }
     const ov_sites from = {.count = sites, .xyz = xyz};
     OV_TRY(ov_facets_set(s->context, &s->facets, to, s->origin));
     OV_TRY(ov_facets_nearer(s->context, &s->meter, &s->facets, &from, squared));
     for (size_t k = 0, site = 0; k < count; ++k)
-        if (far[k]->side != n && far[k]->outer == outer) {
-            far[k]->distance = fmin(far[k]->distance, sqrt((double)squared[site]));
+        if (far[k].side != n && far[k].outer == outer) {
+            far[k].distance = fmin(far[k].distance, sqrt((double)squared[site]));
             ++site;
         }
 cleanup:
@@ -488,8 +524,8 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_spans_seek(ov_surveyor *s, const ov_survey_standing *standing,
-                           ov_survey_far *const *far, size_t count) {
+ovoid_status ov_spans_seek(ov_surveyor *s, const ov_survey_standing *standing, ov_survey_far *far,
+                           size_t count) {
     ovoid_status status = OVOID_OK;
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         for (int outer = 0; outer < 2; ++outer) {

@@ -427,8 +427,6 @@ cleanup:
     return status;
 }
 
-/* ---- surveying ------------------------------------------------------------------------------- */
-
 /* The middle of some terms, which offsets are counted from. */
 static void middle_of(const ov_body *bodies, size_t count, double origin[3]) {
     for (size_t k = 0; k < 3; ++k) {
@@ -440,6 +438,76 @@ static void middle_of(const ov_body *bodies, size_t count, double origin[3]) {
         origin[k] = count > 0 ? 0.5 * low + 0.5 * high : 0.0;
     }
 }
+
+/* ---- what is kept ---------------------------------------------------------------------------- */
+
+struct ov_survey_kept {
+    double origin[3];
+    ov_sheet sheet[OV_SURVEY_SIDES];
+    float *squared[OV_SURVEY_SIDES];
+    size_t bytes;
+};
+
+/* What meshes and distances take, which is most of it. */
+static size_t bytes_of(const ov_sheet *at) {
+    const size_t each = 3 * sizeof(float) + sizeof *at->piece_of + sizeof(float);
+    const size_t triangle = 3 * sizeof(uint32_t) + sizeof *at->zone + sizeof(float);
+    return at->mesh ? each * at->mesh->vertices + triangle * at->mesh->triangles : 0;
+}
+
+/* From the surveyor, without what belongs to the device or can be found again. */
+static void move_to_kept(ov_surveyor *s, ov_survey_kept *kept) {
+    memcpy(kept->origin, s->origin, sizeof kept->origin);
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+        ov_sheet *const at = &s->sheet[n];
+        kept->sheet[n] = (ov_sheet){
+            .mesh = at->mesh, .zone = at->zone, .piece_of = at->piece_of, .pieces = at->pieces};
+        kept->squared[n] = s->squared[n];
+        kept->bytes += bytes_of(at);
+        if (at->mesh)
+            ov_mesh_lighten(at->mesh);
+        at->mesh = NULL;
+        at->zone = NULL;
+        at->piece_of = NULL;
+        s->squared[n] = NULL;
+    }
+}
+
+static void move_from_kept(ov_survey_kept *kept, ov_surveyor *s) {
+    memcpy(s->origin, kept->origin, sizeof s->origin);
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+        s->sheet[n] = kept->sheet[n];
+        s->squared[n] = kept->squared[n];
+        kept->sheet[n] = (ov_sheet){0};
+        kept->squared[n] = NULL;
+    }
+    kept->bytes = 0;
+}
+
+/* Without memory for it nothing is kept. */
+static ov_survey_kept *keep(ov_surveyor *s) {
+    ov_survey_kept *const made = ov_alloc(NULL, 1, sizeof *made, "surfaces");
+    if (made)
+        move_to_kept(s, made);
+    return made;
+}
+
+size_t ov_survey_kept_bytes(const ov_survey_kept *kept) {
+    return kept ? kept->bytes : 0;
+}
+
+void ov_survey_kept_destroy(ov_survey_kept **kept) {
+    if (!*kept)
+        return;
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+        sheet_destroy(&(*kept)->sheet[n]);
+        free((*kept)->squared[n]);
+    }
+    free(*kept);
+    *kept = NULL;
+}
+
+/* ---- surveying ------------------------------------------------------------------------------- */
 
 /* Meshes both surfaces and finds their pieces. The surveyor is to be closed, after a failure too.
  */
@@ -467,8 +535,10 @@ cleanup:
 }
 
 static void close_survey(ov_surveyor *s) {
-    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
+    for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         sheet_destroy(&s->sheet[n]);
+        free(s->squared[n]);
+    }
     ov_facets_destroy(&s->facets);
     ov_grid_destroy(&s->largest);
     ov_grid_destroy(&s->nearest);
@@ -478,7 +548,7 @@ static void close_survey(ov_surveyor *s) {
 
 ovoid_status ov_survey_bodies(ovoid_context *context, const ov_survey_options *options,
                               const ov_survey_terms *terms, const double low[3],
-                              const double high[3], ov_survey_cell *cell) {
+                              const double high[3], ov_survey_cell *cell, ov_survey_kept **kept) {
     ovoid_status status = OVOID_OK;
     ov_survey_cell made = {0};
     ov_surveyor s = {.context = context, .options = options, .low = low, .high = high};
@@ -488,7 +558,12 @@ ovoid_status ov_survey_bodies(ovoid_context *context, const ov_survey_options *o
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         OV_TRY(record_sheet(&s, n, &made));
     if (options->sums)
-        OV_TRY(ov_spans_add(&s, true, NULL, &made));
+        OV_TRY(ov_spans_whole(&s, &made));
+    if (options->sums && !kept)
+        OV_TRY(ov_spans_outer(&s, NULL, &made));
+    made.outer_later = options->sums && kept;
+    if (kept)
+        *kept = keep(&s);
 cleanup:
     close_survey(&s);
     if (status == OVOID_OK)
@@ -507,7 +582,7 @@ ovoid_status ov_survey(ovoid_context *context, const ov_survey_options *options,
     OV_TRY(ov_bodies_of_quadrics(context, original, original_count, &body[0]));
     OV_TRY(ov_bodies_of_quadrics(context, model, model_count, &body[1]));
     const ov_survey_terms terms = {{body[0], body[1]}, {original_count, model_count}};
-    OV_TRY(ov_survey_bodies(context, options, &terms, low, high, cell));
+    OV_TRY(ov_survey_bodies(context, options, &terms, low, high, cell, NULL));
 cleanup:
     free(body[0]);
     free(body[1]);
@@ -515,6 +590,21 @@ cleanup:
 }
 
 /* ---- once more ------------------------------------------------------------------------------- */
+
+/* With the surfaces that were kept, or else anew. */
+static ovoid_status open_again(ov_surveyor *s, const ov_survey_terms *terms, ov_survey_kept *kept) {
+    if (!kept)
+        return open_survey(s, terms);
+    move_from_kept(kept, s);
+    s->meter.watch = &s->watch;
+    return OVOID_OK;
+}
+
+static void close_again(ov_surveyor *s, ov_survey_kept *kept) {
+    if (kept)
+        move_to_kept(s, kept);
+    close_survey(s);
+}
 
 /* The pieces are those that the cell had; all that is known of outer surfaces is forgotten. */
 static ovoid_status forget_outer(const ov_surveyor *s, ov_survey_cell *cell) {
@@ -537,31 +627,32 @@ static ovoid_status forget_outer(const ov_surveyor *s, ov_survey_cell *cell) {
 ovoid_status ov_survey_again(ovoid_context *context, const ov_survey_options *options,
                              const ov_survey_terms *terms, const double low[3],
                              const double high[3], const ov_survey_standing *standing,
-                             ov_survey_cell *cell) {
+                             ov_survey_kept *kept, ov_survey_cell *cell) {
     ovoid_status status = OVOID_OK;
     ov_surveyor s = {.context = context, .options = options, .low = low, .high = high};
-    OV_TRY(open_survey(&s, terms));
+    OV_TRY(open_again(&s, terms, kept));
     OV_TRY(forget_outer(&s, cell));
-    OV_TRY(ov_spans_add(&s, false, standing, cell));
+    OV_TRY(ov_spans_outer(&s, standing, cell));
+    cell->outer_later = false;
 cleanup:
-    close_survey(&s);
+    close_again(&s, kept);
     return status;
 }
 
 ovoid_status ov_survey_seek(ovoid_context *context, const ov_survey_options *options,
                             const ov_survey_terms *terms, const double low[3], const double high[3],
                             const ov_survey_standing *standing, const ov_survey_cell *cell,
-                            ov_survey_far *const *far, size_t count) {
+                            ov_survey_kept *kept, ov_survey_far *far, size_t count) {
     ovoid_status status = OVOID_OK;
     ov_surveyor s = {.context = context, .options = options, .low = low, .high = high};
-    OV_TRY(open_survey(&s, terms));
+    OV_TRY(open_again(&s, terms, kept));
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         if (cell->side[n].pieces != s.sheet[n].pieces)
             OV_TRY(ov_fail(context, OVOID_ERROR_NUMERIC,
                            "the device made another mesh of a surface than before"));
     OV_TRY(ov_spans_seek(&s, standing, far, count));
 cleanup:
-    close_survey(&s);
+    close_again(&s, kept);
     return status;
 }
 

@@ -85,6 +85,8 @@ typedef struct ov_survey_cell {
     ov_survey_side side[OV_SURVEY_SIDES];
     ov_survey_far *far;
     size_t fars, far_capacity;
+    bool outer_later; /* nothing was supposed, and the distances of outer surfaces are still to come
+                         (ov_survey_again()) */
 } ov_survey_cell;
 
 void ov_survey_cell_destroy(ov_survey_cell *cell);
@@ -126,9 +128,17 @@ ovoid_status ov_survey(ovoid_context *context, const ov_survey_options *options,
                        size_t model_count, const double low[3], const double high[3],
                        ov_survey_cell *cell);
 
+/* Both surfaces of a cell as a survey of sums found them, and how far they are from each other, for
+ * a second look: on the host alone. */
+typedef struct ov_survey_kept ov_survey_kept;
+size_t ov_survey_kept_bytes(const ov_survey_kept *kept);
+void ov_survey_kept_destroy(ov_survey_kept **kept);
+
+/* kept: NULL, or where to leave what a second look needs, which the distances of outer surfaces are
+ * left to then; NULL there where memory is short. */
 ovoid_status ov_survey_bodies(ovoid_context *context, const ov_survey_options *options,
                               const ov_survey_terms *terms, const double low[3],
-                              const double high[3], ov_survey_cell *cell);
+                              const double high[3], ov_survey_cell *cell, ov_survey_kept **kept);
 
 /* ---- when all cells are known ---------------------------------------------------------------- */
 
@@ -156,21 +166,23 @@ void ov_survey_standing_destroy(ov_survey_standing *standing);
 /* For the vertex with this key: 1 on an outer surface, -1 on the wall of a cavity, 0 not known. */
 int ov_survey_stands(const ov_survey_standing *standing, size_t side, uint64_t key);
 
-/* Whether all that cell c supposed of outer surfaces is so. */
+/* Whether all that cell c supposed of outer surfaces is so, and has led to their distances. */
 bool ov_survey_holds(const ov_survey_standing *standing, const ov_survey_cell *cell, size_t c);
 
 /* Surveys the distances of cell options->cell from outer surfaces again, now that they are known:
- * the same terms and the same cell as before. */
+ * the same terms and the same cell as before. kept: what the cell's survey has left, whose
+ * distances this needs for the last time, and terms are not looked at; NULL: the surfaces are made
+ * anew. */
 ovoid_status ov_survey_again(ovoid_context *context, const ov_survey_options *options,
                              const ov_survey_terms *terms, const double low[3],
                              const double high[3], const ov_survey_standing *standing,
-                             ov_survey_cell *cell);
+                             ov_survey_kept *kept, ov_survey_cell *cell);
 
-/* Looks for what is nearer to these points of other cells in cell options->cell. */
+/* Looks for what is nearer to these points of other cells in cell options->cell. kept: as above. */
 ovoid_status ov_survey_seek(ovoid_context *context, const ov_survey_options *options,
                             const ov_survey_terms *terms, const double low[3], const double high[3],
                             const ov_survey_standing *standing, const ov_survey_cell *cell,
-                            ov_survey_far *const *far, size_t count);
+                            ov_survey_kept *kept, ov_survey_far *far, size_t count);
 
 /* The distance of a point that was far has become known. */
 void ov_survey_settle(const ov_survey_far *far, ov_survey_cell *cell);

@@ -502,6 +502,8 @@ static bool askings_hold(const ov_survey_standing *standing, const ov_survey_sid
 }
 
 bool ov_survey_holds(const ov_survey_standing *standing, const ov_survey_cell *cell, size_t c) {
+    if (cell->outer_later)
+        return false;
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         const ov_survey_side *const side = &cell->side[n];
         for (size_t p = 0; p < side->pieces; ++p)

@@ -43,6 +43,8 @@ typedef struct ov_surveyor {
     ov_meter meter;
     ov_facets facets; /* of the triangles that count */
     ov_sheet sheet[OV_SURVEY_SIDES];
+    float *squared[OV_SURVEY_SIDES]; /* distances of what is measured from in the cell to all of the
+                                        other surface, where sums are wanted; NULL: not known yet */
 } ov_surveyor;
 
 /* A hash of where a vertex is, the same in each cell. */
@@ -55,15 +57,17 @@ ovoid_status ov_survey_add_key(ovoid_context *context, uint64_t key, uint32_t pi
 /* Puts on record a few of the vertices in the cell which others have in their halo. */
 ovoid_status ov_spans_mark(ov_surveyor *surveyor, size_t side, ov_survey_side *record);
 
-/* Puts the distances on record: from both surfaces to the other one (whole), and from their outer
- * components to the other's, as they are known to stand, or, where standing is NULL, are supposed
- * to. */
-ovoid_status ov_spans_add(ov_surveyor *surveyor, bool whole, const ov_survey_standing *standing,
-                          ov_survey_cell *cell);
+/* Puts the distances on record that both surfaces have from the other one. */
+ovoid_status ov_spans_whole(ov_surveyor *surveyor, ov_survey_cell *cell);
+
+/* The same from their outer components to the other's, as they are known to stand, or, where
+ * standing is NULL, are supposed to. */
+ovoid_status ov_spans_outer(ov_surveyor *surveyor, const ov_survey_standing *standing,
+                            ov_survey_cell *cell);
 
 /* Makes the distances of these points smaller where something in the cell is nearer to them. */
 ovoid_status ov_spans_seek(ov_surveyor *surveyor, const ov_survey_standing *standing,
-                           ov_survey_far *const *far, size_t count);
+                           ov_survey_far *far, size_t count);
 
 /* Finds which vertices hang together by triangles in this zone or further in: of[v] leads to the
  * first of them (mesh/union.h); OV_NO_PIECE: v is of no such triangle. */

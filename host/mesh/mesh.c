@@ -388,6 +388,13 @@ ovoid_status ovoid_mesh_create(ovoid_context *context, const double *xyz, const 
     return status;
 }
 
+void ov_mesh_lighten(ovoid_mesh *mesh) {
+    free(mesh->normals);
+    mesh->normals = NULL;
+    for (size_t k = 0; k < sizeof mesh->on_device / sizeof *mesh->on_device; ++k)
+        ov_buffer_destroy(&mesh->on_device[k]);
+}
+
 void ovoid_mesh_destroy(ovoid_mesh **mesh) {
     if (!mesh || !*mesh)
         return;

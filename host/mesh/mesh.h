@@ -70,6 +70,9 @@ ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const d
 ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh);
 ovoid_status ov_mesh_check(ovoid_context *context, const ovoid_mesh *mesh);
 
+/* Leaves of a light mesh where its vertices are and how they hang together, on the host. */
+void ov_mesh_lighten(ovoid_mesh *mesh);
+
 /* Component of a triangle. */
 static inline const ovoid_component *ov_mesh_component_of_triangle(const ovoid_mesh *mesh,
                                                                    size_t triangle) {

@@ -195,6 +195,30 @@ static void tolerances(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* What holds by the meshes that a fit is told to judge by does so by finer ones, which see into
+ * clefts that those miss. */
+static void tolerances_of_finer_meshes(void **state) {
+    if (test_small())
+        skip();
+    for (uint64_t seed = 1; seed <= 4; ++seed) {
+        ovoid_molecule *molecule = random_chain(*state, 150, seed);
+        const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+        ovoid_measure_options measuring;
+        ovoid_measures measures;
+        outcome o = fit(*state, molecule, &options);
+        assert_true(o.result.reached);
+        ovoid_measure_options_init(&measuring, sizeof measuring);
+        measuring.spacing = 0.5 * options.adaptive.mesh_spacing;
+        ovoid_measures_init(&measures, sizeof measures);
+        test_check(*state, once_measure(*state, molecule, o.model, &measuring, &measures));
+        print_message("%.4g, by meshes half as coarse %.4g\n", o.measures.deviation,
+                      measures.deviation);
+        assert_true(measures.deviation <= 0.5 + 1e-4);
+        ovoid_model_destroy(&o.model);
+        ovoid_molecule_destroy(&molecule);
+    }
+}
+
 /* Ellipsoids of a fit that reaches the tolerance. */
 static size_t needed(ovoid_context *context, const double *xyzr, size_t atoms, double tolerance) {
     ovoid_molecule *molecule = molecule_of(context, xyzr, atoms);
@@ -720,6 +744,7 @@ int main(void) {
         cmocka_unit_test(owners),
         cmocka_unit_test(tolerances),
         cmocka_unit_test(twice_as_large_needs_twice_as_many),
+        cmocka_unit_test(tolerances_of_finer_meshes),
         cmocka_unit_test(no_count_does_better),
         cmocka_unit_test(tolerances_out_of_reach),
         cmocka_unit_test(two_atoms_as_one),

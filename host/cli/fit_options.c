@@ -115,7 +115,7 @@ const cli_number fit_mesh_spacing_number = {
     false,
     "Å",
     "of the meshes on which the surfaces are compared, at the end and by method adaptive on the "
-    "way"};
+    "way. What is within a tolerance is so by meshes of half of it, too, but no finer than 0.25 Å"};
 
 /* Values of the long options; those of the numbers follow. */
 enum {

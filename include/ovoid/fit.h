@@ -80,7 +80,9 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
     uint32_t effort;     /* 1 (the default) to 10: how many starts and repairs are tried */
     uint32_t steps;      /* Levenberg-Marquardt steps of one refinement at most: 60; 0 leaves the
                             merged Gaussians as they are */
-    double mesh_spacing; /* of the meshes that surfaces are judged on, angstrom: 0.5 */
+    double mesh_spacing; /* of the meshes that surfaces are judged on, angstrom: 0.5. What is
+                            within the tolerance is so by meshes of half of this as well, but no
+                            finer than 0.25 (times sqrt(0.5 / decay)) */
 } ovoid_adaptive_options;
 
 /* A molecule of more atoms than this is fitted in parts of at most so many, one after the other or

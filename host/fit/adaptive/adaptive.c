@@ -104,9 +104,8 @@ cleanup:
 
 /* What judges are not to look at: where the first `count` of f->quadrics, which nothing is to be
  * held against, are off. */
-static ovoid_status excuse(ov_adaptive *f, size_t count) {
+static ovoid_status excuse(ov_adaptive *f, size_t count, ov_judge *judge) {
     ovoid_status status = OVOID_OK;
-    ov_judge *const judge = &f->judge;
     ov_judgement judgement;
     size_t kept = 0;
     count = ov_adaptive_surround(f, count);
@@ -126,8 +125,7 @@ cleanup:
  * none of its doing: cavities that are cut open at the end of what is about it, and what neighbours
  * left. In a start that holds but for some spots, what else seems to be off does not count as a
  * whole. */
-static ovoid_status judge_region(ov_adaptive *f) {
-    ov_judge *const judge = &f->judge;
+static ovoid_status judge_region(ov_adaptive *f, ov_judge *judge) {
     const bool mends = f->around.spot_count > 0;
     judge->in_region = true;
     judge->excused_reach = ov_tuned.part_excused / judge->root_2d;
@@ -141,7 +139,18 @@ static ovoid_status judge_region(ov_adaptive *f) {
         memcpy(f->quadrics, f->start->quadrics, f->start->count * sizeof *f->quadrics);
     for (size_t i = 0; i < f->atoms && !mends; ++i)
         ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &f->quadrics[i]);
-    return excuse(f, mends ? f->start->count : f->atoms);
+    return excuse(f, mends ? f->start->count : f->atoms, judge);
+}
+
+ovoid_status ov_adaptive_judge_at(ov_adaptive *f, double spacing, ov_judge *judge) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_judge_create(f->context, f->xyzr, f->atoms + f->around.atoms, f->options->decay,
+                           f->options->isovalue, spacing,
+                           (ov_watch){.go_on = ov_adaptive_report, .user = f}, judge));
+    if (f->around.atoms > 0)
+        OV_TRY(judge_region(f, judge));
+cleanup:
+    return status;
 }
 
 /* What all goals share, unless it is there. */
@@ -158,11 +167,7 @@ static ovoid_status prepare(ov_adaptive *f) {
     OV_TRY(sample(f, &targets));
     f->stage = "mesh";
     f->count = f->atoms;
-    OV_TRY(ov_judge_create(f->context, f->xyzr, f->atoms + f->around.atoms, options->decay,
-                           options->isovalue, options->adaptive.mesh_spacing,
-                           (ov_watch){.go_on = ov_adaptive_report, .user = f}, &f->judge));
-    if (f->around.atoms > 0)
-        OV_TRY(judge_region(f));
+    OV_TRY(ov_adaptive_judge_at(f, options->adaptive.mesh_spacing, &f->judge));
     f->prepared = true;
 cleanup:
     return status;
@@ -308,6 +313,30 @@ static void tell(const ov_adaptive *f, size_t count, const ov_judgement *judgeme
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
 
+/* What was confirmed at a finer spacing may be lost by making the volumes equal, and is then as it
+ * was. */
+static ovoid_status keep_confirmed(ov_adaptive *f, const ov_trial *best, ov_judgement *judgement) {
+    const double tolerance = f->options->adaptive.tolerance;
+    const size_t count = ov_adaptive_surround(f, best->count);
+    ov_judgement finely;
+    ov_spot *spots = NULL;
+    size_t found;
+    const ovoid_status status =
+        ov_judge_spots(&f->fine, f->quadrics, count, tolerance, 0.0, 1, &finely, &spots, &found);
+    free(spots);
+    if (status != OVOID_OK)
+        return status;
+    const bool holds = finely.valid && finely.deviation <= tolerance;
+    if (!holds && best->judgement.deviation <= tolerance) {
+        ov_adaptive_quadrics(f, best);
+        *judgement = best->judgement;
+    } else if (!holds) {
+        judgement->valid = judgement->valid && finely.valid;
+        judgement->deviation = fmax(judgement->deviation, finely.deviation);
+    }
+    return OVOID_OK;
+}
+
 /* The last judgement, with the volumes made equal. */
 static ovoid_status finish(ov_adaptive *f, const ov_trial *best, ov_found *found,
                            ovoid_fit_result *result) {
@@ -315,6 +344,8 @@ static ovoid_status finish(ov_adaptive *f, const ov_trial *best, ov_found *found
     ov_judgement judgement;
     ov_adaptive_quadrics(f, best);
     OV_TRY(calibrate(f, best->count, &judgement));
+    if (f->finely)
+        OV_TRY(keep_confirmed(f, best, &judgement));
     OV_TRY(hand_over(f, best, found));
     tell(f, best->count, &judgement, result);
 cleanup:
@@ -372,6 +403,7 @@ void ov_adaptive_forget(ov_adaptive *f) {
     ov_adaptive_drop_reductions(f);
     ov_refiner_forget(&f->refiner);
     ov_judge_destroy(&f->judge);
+    ov_judge_destroy(&f->fine);
     ov_target_destroy(&f->target);
     ov_samples_destroy(&f->samples);
 }
@@ -406,6 +438,7 @@ static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const
     f->options = options;
     f->start = start;
     f->fewest = 0;
+    f->finely = false;
     f->held = NULL;
     f->steps = 0;
     f->misfit = 0.0;
@@ -444,6 +477,8 @@ cleanup:
     if (status == OVOID_OK || status == OVOID_ERROR_CANCELLED)
         ov_device_counted(device, before, result->counts);
     ov_trial_destroy(&best);
+    if (!f->keep)
+        ov_judge_destroy(&f->fine);
     f->held = NULL;
     return status;
 }

@@ -35,6 +35,8 @@ struct ov_adaptive {
     ov_local local;
     ov_merger merger;
     ov_judge judge;
+    ov_judge fine;    /* at a finer spacing; mesh is NULL until a model is to be confirmed */
+    bool finely;      /* models are judged by that, too */
     double spacing;   /* of the points */
     double expected;  /* distance of a coarse model, in units of 1 / sqrt(2 d); 0: of none */
     double width_max; /* angstrom: no axis, 1 / sqrt(decay rate), becomes longer */
@@ -138,6 +140,8 @@ ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size
 ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best);
 /* The fewest ellipsoids with a deviation of at most `tolerance` angstrom, or the best there is. */
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best);
+/* A judge like f->judge at another spacing, of meshes, angstrom. */
+ovoid_status ov_adaptive_judge_at(ov_adaptive *f, double spacing, ov_judge *judge);
 /* The start, with more ellipsoids where it is off. */
 ovoid_status ov_adaptive_mend(ov_adaptive *f, double tolerance, ov_trial *best);
 

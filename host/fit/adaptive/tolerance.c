@@ -8,16 +8,28 @@ bool ov_trial_holds(const ov_trial *t, double tolerance) {
     return t->judgement.valid && t->judgement.deviation <= tolerance;
 }
 
-ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
-                               ov_spots *spots) {
+static ovoid_status find_spots(ov_adaptive *f, ov_judge *judge, ov_trial *t, double tolerance,
+                               size_t most, ov_spots *spots) {
     ov_spots_destroy(spots);
     ov_adaptive_quadrics(f, t);
     const size_t count = ov_adaptive_surround(f, t->count);
     const ovoid_status status =
-        ov_judge_spots(&f->judge, f->quadrics, count, tolerance, ov_tuned.spots_apart, most,
+        ov_judge_spots(judge, f->quadrics, count, tolerance, ov_tuned.spots_apart, most,
                        &t->judgement, &spots->spot, &spots->count);
     if (status == OVOID_OK && (!t->judgement.valid || t->judgement.deviation <= tolerance))
         spots->count = 0;
+    return status;
+}
+
+ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
+                               ov_spots *spots) {
+    ovoid_status status = find_spots(f, &f->judge, t, tolerance, most, spots);
+    const double coarse = t->judgement.deviation;
+    if (status != OVOID_OK || !f->finely || !ov_trial_holds(t, tolerance))
+        return status;
+    status = find_spots(f, &f->fine, t, tolerance, most, spots);
+    if (ov_trial_holds(t, tolerance)) /* by both: what is told is what meshes of the spacing tell */
+        t->judgement.deviation = coarse;
     return status;
 }
 
@@ -106,6 +118,55 @@ static ovoid_status shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
     return status;
 }
 
+/* Whether what was seen of a model is better than what was seen of another one. */
+static bool is_better(const ov_judgement *one, const ov_judgement *other) {
+    return one->valid && (!other->valid || one->deviation < other->deviation);
+}
+
+/* A trial that held, at a finer spacing: grows where it is off there, and so seen by both. */
+static ovoid_status confirm_trial(ov_adaptive *f, double tolerance, ov_trial *t, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    ov_spots spots = {0};
+    const ov_growing how = {.stage = "confirm",
+                            .most = f->atoms,
+                            .rounds = ov_tuned.confirm_patience + ov_tuned.grow_rounds,
+                            .patience = ov_tuned.confirm_patience};
+    OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
+    const ov_judgement first = t->judgement;
+    OV_TRY(ov_adaptive_grow(f, tolerance, &how, t, &spots));
+    if (ov_trial_holds(t, tolerance) || is_better(&t->judgement, &first))
+        ov_trial_swap(t, best);
+    else
+        best->judgement = first;
+cleanup:
+    ov_spots_destroy(&spots);
+    return status;
+}
+
+/* A mesh misses what is narrower than its steps, such as the end of a groove, and the model's may
+ * be elsewhere than the original's: what holds has to do so by a finer one, too. */
+static ovoid_status confirm(ov_adaptive *f, double tolerance, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    const double coarse = f->options->adaptive.mesh_spacing;
+    const double least = ov_tuned.confirm_spacing * sqrt(0.5 / f->options->decay);
+    const double fine = fmax(ov_tuned.confirm_finer * coarse, least);
+    ov_trial t = {0};
+    if (fine >= coarse)
+        return OVOID_OK;
+    f->stage = "confirm";
+    OV_TRY(ov_trial_create(f, &t));
+    ov_trial_copy(best, &t);
+    if (!f->fine.mesh)
+        OV_TRY(ov_adaptive_judge_at(f, fine, &f->fine));
+    ov_judge_begin(&f->fine);
+    f->finely = f->fine.mesh;
+    if (f->finely)
+        OV_TRY(confirm_trial(f, tolerance, &t, best));
+cleanup:
+    ov_trial_destroy(&t);
+    return status;
+}
+
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     if (f->start)
@@ -121,6 +182,7 @@ ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *b
     if (ov_trial_holds(best, tolerance)) {
         f->held = best;
         OV_TRY(shrink(f, tolerance, best));
+        OV_TRY(confirm(f, tolerance, best));
     }
     ov_adaptive_quadrics(f, best);
     OV_TRY(ov_owner_tidy(f->context, f->xyzr, f->atoms, f->quadrics, best->count,

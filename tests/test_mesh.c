@@ -1,6 +1,7 @@
 /*
  * Meshes: what they say of themselves, against closed forms.
  */
+#include "base/parallel.h"
 #include "shapes.h"
 #include "support.h"
 
@@ -99,6 +100,123 @@ static void test_many_edges(void **state) {
         ovoid_mesh_destroy(&mesh);
     }
     shape_destroy(&s);
+}
+
+/* Numbers from 0 to count - 1 in any order. */
+static uint32_t *any_order(size_t count, uint64_t seed) {
+    test_random random = {seed};
+    uint32_t *const order = test_alloc(count, sizeof *order);
+    for (size_t k = 0; k < count; ++k)
+        order[k] = (uint32_t)k;
+    for (size_t k = count; k-- > 1;) {
+        const size_t other = (size_t)(random_bits(&random) % (k + 1));
+        const uint32_t swap = order[k];
+        order[k] = order[other];
+        order[other] = swap;
+    }
+    return order;
+}
+
+/* A torus of very many triangles with small spheres and a cavity about it, its vertices or its
+ * triangles as they come or in any order: several parts, whose triangles lead into others. */
+static ovoid_mesh *large_mesh(ovoid_context *context, bool vertices, bool triangles) {
+    shape s = {0};
+    ovoid_mesh *mesh = NULL;
+    for (size_t k = 0; k < 40; ++k)
+        shape_add_sphere(&s, 1, 0.5 + 0.01 * (double)k, 3.0 * (double)k, 20, 0);
+    shape_add_torus(&s, 200, 5.0, 1.0);
+    shape_add_ellipsoid(&s, 4, (const double[3]){2, 2, 3}, (const double[3]){-20, 0, 0}, true);
+    uint32_t *const place = any_order(s.vertices, 3), *const turn = any_order(s.triangles, 4);
+    double *const xyz = test_alloc(3 * s.vertices, sizeof *xyz);
+    uint32_t *const corners = test_alloc(3 * s.triangles, sizeof *corners);
+    for (size_t v = 0; v < s.vertices; ++v)
+        memcpy(xyz + 3 * (vertices ? place[v] : v), s.xyz + 3 * v, 3 * sizeof *xyz);
+    for (size_t k = 0; k < 3 * s.triangles; ++k) {
+        const uint32_t v = s.corners[3 * (triangles ? turn[k / 3] : k / 3) + k % 3];
+        corners[k] = vertices ? place[v] : v;
+    }
+    test_check(context,
+               ovoid_mesh_create(context, xyz, NULL, s.vertices, corners, s.triangles, &mesh));
+    assert_true(s.triangles > 60000);
+    shape_destroy(&s);
+    free(place);
+    free(turn);
+    free(xyz);
+    free(corners);
+    return mesh;
+}
+
+/* What each triangle adds, one after the other. */
+static ov_content smooth_by_triangles(const ovoid_mesh *mesh, bool outer_only) {
+    ov_content content = {0.0, 0.0};
+    double origin[3];
+    ov_mesh_at(mesh, 0, origin);
+    for (size_t t = 0; t < mesh->triangles; ++t)
+        if (!outer_only || ov_mesh_component_of_triangle(mesh, t)->outer)
+            ov_mesh_smooth_triangle(mesh, t, origin, &content);
+    return content;
+}
+
+static void expect_smooth(const ovoid_mesh *mesh) {
+    for (int outer = 0; outer < 2; ++outer) {
+        const ov_content got = ov_mesh_smooth(mesh, outer),
+                         wanted = smooth_by_triangles(mesh, outer);
+        assert_memory_equal(&got, &wanted, sizeof got);
+    }
+    assert_true(ov_mesh_smooth(mesh, true).area < ov_mesh_smooth(mesh, false).area);
+}
+
+static void test_threads_change_nothing(void **state) {
+    for (int order = 0; order < 4; ++order) {
+        ovoid_mesh *several, *alone;
+        ov_parallel_limit(1);
+        alone = large_mesh(*state, order & 1, order & 2);
+        ov_parallel_limit(5);
+        several = large_mesh(*state, order & 1, order & 2);
+        expect_smooth(several);
+        ov_parallel_limit(0);
+        expect_smooth(alone);
+        assert_int_equal(alone->components, 42);
+        for (size_t t = 0; t < alone->triangles; ++t) /* of one component, all three */
+            for (size_t i = 1; i < 3; ++i)
+                assert_int_equal(alone->component_of[alone->corners[3 * t]],
+                                 alone->component_of[alone->corners[3 * t + i]]);
+        for (size_t c = 0; c < alone->components; ++c) {
+            const ovoid_component *const one = &alone->component[c];
+            assert_true(one->closed);
+            assert_int_equal(one->triangles, 2 * (one->vertices - (size_t)one->euler));
+        }
+        assert_int_equal(several->components, alone->components);
+        assert_memory_equal(several->component_of, alone->component_of,
+                            alone->vertices * sizeof *alone->component_of);
+        assert_memory_equal(several->component, alone->component,
+                            alone->components * sizeof *alone->component);
+        ovoid_mesh_destroy(&alone);
+        ovoid_mesh_destroy(&several);
+    }
+}
+
+/* What is no mesh is told of where it is, however large. */
+static void test_faults_of_large_meshes(void **state) {
+    ovoid_mesh *const mesh = large_mesh(*state, true, true);
+    char text[100];
+    const size_t triangle = mesh->triangles - 7, vertex = mesh->vertices / 3;
+    const uint32_t corner = mesh->corners[3 * triangle + 1];
+    mesh->corners[3 * triangle + 1] = (uint32_t)mesh->vertices;
+    assert_int_equal(ov_mesh_check(*state, mesh), OVOID_ERROR_ARGUMENT);
+    snprintf(text, sizeof text, "triangle %zu of a mesh", triangle);
+    assert_non_null(strstr(ovoid_context_error(*state), text));
+    mesh->corners[3 * triangle + 1] = corner;
+    mesh->normals[3 * vertex + 2] = NAN;
+    assert_int_equal(ov_mesh_check(*state, mesh), OVOID_ERROR_ARGUMENT);
+    mesh->normals[3 * vertex + 2] = 0.0f;
+    mesh->xyz[3 * vertex] = -INFINITY;
+    assert_int_equal(ov_mesh_check(*state, mesh), OVOID_ERROR_ARGUMENT);
+    snprintf(text, sizeof text, "vertex %zu of a mesh", vertex);
+    assert_non_null(strstr(ovoid_context_error(*state), text));
+    mesh->xyz[3 * vertex] = 0.0;
+    test_check(*state, ov_mesh_check(*state, mesh));
+    ovoid_mesh_destroy((ovoid_mesh **)&mesh);
 }
 
 /* A light mesh says the same, but for its edges. */
@@ -329,11 +447,18 @@ static void test_refusals(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tetrahedron), cmocka_unit_test(test_one_triangle),
-        cmocka_unit_test(test_defects),     cmocka_unit_test(test_components),
-        cmocka_unit_test(test_many_edges),  cmocka_unit_test(test_light),
-        cmocka_unit_test(test_orders),      cmocka_unit_test(test_flat_surface_stays_flat),
-        cmocka_unit_test(test_needles),     cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_tetrahedron),
+        cmocka_unit_test(test_one_triangle),
+        cmocka_unit_test(test_defects),
+        cmocka_unit_test(test_components),
+        cmocka_unit_test(test_many_edges),
+        cmocka_unit_test(test_light),
+        cmocka_unit_test(test_orders),
+        cmocka_unit_test(test_flat_surface_stays_flat),
+        cmocka_unit_test(test_needles),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_threads_change_nothing),
+        cmocka_unit_test(test_faults_of_large_meshes),
     };
     return cmocka_run_group_tests(tests, make_context, test_close);
 }

@@ -54,14 +54,15 @@ static uint64_t count_outer(const ovoid_mesh *mesh) {
 }
 
 static ovoid_status compare_contents(ovoid_context *context, const ovoid_mesh *original,
-                                     const ovoid_mesh *sparse, bool smooth, bool outer_only,
-                                     ovoid_pair *area, ovoid_pair *volume) {
+                                     const ovoid_mesh *sparse, bool smooth, ovoid_measures *made) {
     ovoid_status status = OVOID_OK;
-    ov_content first, second;
-    OV_TRY(ov_mesh_content(context, original, smooth, outer_only, &first));
-    OV_TRY(ov_mesh_content(context, sparse, smooth, outer_only, &second));
-    *area = ov_pair_of(first.area, second.area);
-    *volume = ov_pair_of(first.volume, second.volume);
+    ov_content first, second, first_outer, second_outer;
+    OV_TRY(ov_mesh_contents(context, original, smooth, &first, &first_outer));
+    OV_TRY(ov_mesh_contents(context, sparse, smooth, &second, &second_outer));
+    made->area = ov_pair_of(first.area, second.area);
+    made->volume = ov_pair_of(first.volume, second.volume);
+    made->area_outer = ov_pair_of(first_outer.area, second_outer.area);
+    made->volume_outer = ov_pair_of(first_outer.volume, second_outer.volume);
 cleanup:
     return status;
 }
@@ -105,9 +106,7 @@ ovoid_status ov_measure_meshes(ovoid_context *context, const ovoid_mesh *origina
     made.components_sparse = sparse->components;
     made.outer_original = count_outer(original);
     made.outer_sparse = count_outer(sparse);
-    OV_TRY(compare_contents(context, original, sparse, smooth, false, &made.area, &made.volume));
-    OV_TRY(compare_contents(context, original, sparse, smooth, true, &made.area_outer,
-                            &made.volume_outer));
+    OV_TRY(compare_contents(context, original, sparse, smooth, &made));
     if (distances) {
         OV_TRY(compare_vertices(context, original, sparse, &made));
         made.distances_outer = made.distances;

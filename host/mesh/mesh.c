@@ -1,64 +1,14 @@
 #include "mesh/mesh.h"
+#include "base/parallel.h"
+#include "mesh/components.h"
 #include "mesh/exposed.h"
-#include "mesh/union.h"
+#include "mesh/vectors.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* ---- vectors ------------------------------------------------------------------------------ */
-
-static void subtract(const double *a, const double *b, double *result) {
-    for (int k = 0; k < 3; ++k)
-        result[k] = a[k] - b[k];
-}
-
-static double dot(const double *a, const double *b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double *a, const double *b, double *result) {
-    result[0] = a[1] * b[2] - a[2] * b[1];
-    result[1] = a[2] * b[0] - a[0] * b[2];
-    result[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static void corners_at(const ovoid_mesh *mesh, size_t triangle, double *a, double *b, double *c) {
-    const uint32_t *const corner = mesh->corners + 3 * triangle;
-    ov_mesh_at(mesh, corner[0], a);
-    ov_mesh_at(mesh, corner[1], b);
-    ov_mesh_at(mesh, corner[2], c);
-}
-
-/* ---- components --------------------------------------------------------------------------- */
-
-/* Fills component_of, components and the counts of component. */
-static ovoid_status find_components(ovoid_context *context, ovoid_mesh *mesh) {
-    uint32_t *const of = mesh->component_of;
-    for (size_t v = 0; v < mesh->vertices; ++v)
-        of[v] = (uint32_t)v;
-    for (size_t t = 0; t < mesh->triangles; ++t) {
-        const uint32_t *const corner = mesh->corners + 3 * t;
-        ov_unite(of, corner[0], corner[1]);
-        ov_unite(of, corner[0], corner[2]);
-    }
-    size_t count = 0;
-    for (size_t v = 0; v < mesh->vertices; ++v)
-        count += of[v] == v;
-    mesh->components = count;
-    mesh->component = ov_alloc(context, count, sizeof *mesh->component, "components of a mesh");
-    if (!mesh->component)
-        return OVOID_ERROR_MEMORY;
-    /* Parents come before their children: when v is met, of[parent] is a component already. */
-    uint32_t next = 0;
-    for (size_t v = 0; v < mesh->vertices; ++v) {
-        of[v] = of[v] == v ? next++ : of[of[v]];
-        ++mesh->component[of[v]].vertices;
-    }
-    for (size_t t = 0; t < mesh->triangles; ++t)
-        ++mesh->component[of[mesh->corners[3 * t]]].triangles;
-    return OVOID_OK;
-}
+/* ---- edges --------------------------------------------------------------------------------- */
 
 /* A half-edge, filed under its vertex of lower index: twice the other one, + 1 if it runs towards
  * the lower one. */
@@ -181,65 +131,44 @@ cleanup:
     return status;
 }
 
-static inline void add_flat(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
-                            ov_content *content) {
-    double a[3], u[3], v[3], normal[3];
-    corners_at(mesh, triangle, a, u, v);
-    subtract(u, a, u);
-    subtract(v, a, v);
-    subtract(a, origin, a);
-    cross(u, v, normal);
-    content->area += 0.5 * sqrt(dot(normal, normal));
-    content->volume += dot(a, normal) / 6.0;
-}
-
-void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
-                           ov_content *content) {
-    add_flat(mesh, triangle, origin, content);
-}
-
-void ov_mesh_flat_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]) {
-    double a[3], u[3], v[3], normal[3];
-    corners_at(mesh, triangle, a, u, v);
-    subtract(u, a, u);
-    subtract(v, a, v);
-    cross(u, v, normal);
-    for (size_t k = 0; k < 3; ++k)
-        vector[k] += 0.5 * normal[k];
-}
-
-/* Flat areas and volumes. Each component has its own origin, one of its vertices, so that little
- * cancels; where it is closed the origin does not matter. */
-static ovoid_status measure_components(ovoid_context *context, ovoid_mesh *mesh) {
-    uint32_t *const first =
-        ov_alloc(context, mesh->components, sizeof *first, "components of a mesh");
-    if (!first)
-        return OVOID_ERROR_MEMORY;
-    for (size_t v = mesh->vertices; v-- > 0;)
-        first[mesh->component_of[v]] = (uint32_t)v;
-    for (size_t t = 0; t < mesh->triangles;) { /* neighbours are mostly of one component */
-        const uint32_t c = mesh->component_of[mesh->corners[3 * t]];
-        ov_content content = {mesh->component[c].area, mesh->component[c].volume};
-        double origin[3];
-        ov_mesh_at(mesh, first[c], origin);
-        for (; t < mesh->triangles && mesh->component_of[mesh->corners[3 * t]] == c; ++t)
-            add_flat(mesh, t, origin, &content);
-        mesh->component[c].area = content.area;
-        mesh->component[c].volume = content.volume;
-    }
-    for (size_t c = 0; c < mesh->components; ++c)
-        mesh->component[c].outer = mesh->component[c].volume > 0.0;
-    free(first);
-    return OVOID_OK;
-}
-
 /* ---- making ------------------------------------------------------------------------------- */
 
-ovoid_status ov_mesh_check(ovoid_context *context, const ovoid_mesh *mesh) {
-    if (mesh->vertices > UINT32_MAX - 1 || mesh->triangles > UINT32_MAX - 1)
-        return ov_fail(context, OVOID_ERROR_LIMIT,
-                       "a mesh holds at most 2^32 - 2 vertices and triangles, not %zu and %zu",
-                       mesh->vertices, mesh->triangles);
+/* Of an array of floats or doubles, whether all are finite: faster than to look for the first that
+ * is not, which nearly always there is none. */
+static bool are_finite(const float *some, const double *others, size_t first, size_t end) {
+    bool finite = true;
+    for (size_t k = first; some && k < end; ++k)
+        finite &= isfinite(some[k]) != 0;
+    for (size_t k = first; others && k < end; ++k)
+        finite &= isfinite(others[k]) != 0;
+    return finite;
+}
+
+/* A share of the arrays. */
+#define CHECK_PARTS 16
+typedef struct checking {
+    const ovoid_mesh *mesh;
+    bool fine[CHECK_PARTS];
+} checking;
+
+static void check_part(size_t k, void *user) {
+    checking *const c = user;
+    const ovoid_mesh *const mesh = c->mesh;
+    const size_t vertices = 3 * mesh->vertices, corners = 3 * mesh->triangles;
+    const size_t from = vertices / CHECK_PARTS * k,
+                 to = k + 1 < CHECK_PARTS ? vertices / CHECK_PARTS * (k + 1) : vertices;
+    const size_t first = corners / CHECK_PARTS * k,
+                 end = k + 1 < CHECK_PARTS ? corners / CHECK_PARTS * (k + 1) : corners;
+    uint32_t most = 0;
+    for (size_t n = first; n < end; ++n)
+        most = mesh->corners[n] > most ? mesh->corners[n] : most;
+    c->fine[k] = are_finite(mesh->xyz ? NULL : mesh->offsets, mesh->xyz, from, to) &&
+                 are_finite(mesh->normals, NULL, from, to) &&
+                 (first == end || most < mesh->vertices);
+}
+
+/* Says what is wrong with a mesh, if anything is. */
+static ovoid_status find_fault(ovoid_context *context, const ovoid_mesh *mesh) {
     for (size_t k = 0; k < 3 * mesh->vertices; ++k)
         if (!isfinite(mesh->xyz ? mesh->xyz[k] : mesh->offsets[k]) ||
             (mesh->normals && !isfinite(mesh->normals[k])))
@@ -251,6 +180,24 @@ ovoid_status ov_mesh_check(ovoid_context *context, const ovoid_mesh *mesh) {
             return ov_fail(context, OVOID_ERROR_ARGUMENT,
                            "triangle %zu of a mesh names vertex %lu, but there are %zu", k / 3,
                            (unsigned long)mesh->corners[k], mesh->vertices);
+    return OVOID_OK;
+}
+
+/* Few arrays are not worth threads. */
+#define CHECK_MANY ((size_t)1 << 15)
+
+ovoid_status ov_mesh_check(ovoid_context *context, const ovoid_mesh *mesh) {
+    checking c = {.mesh = mesh};
+    if (mesh->vertices > UINT32_MAX - 1 || mesh->triangles > UINT32_MAX - 1)
+        return ov_fail(context, OVOID_ERROR_LIMIT,
+                       "a mesh holds at most 2^32 - 2 vertices and triangles, not %zu and %zu",
+                       mesh->vertices, mesh->triangles);
+    if (mesh->triangles < CHECK_MANY)
+        return find_fault(context, mesh);
+    ov_parallel(CHECK_PARTS, check_part, &c);
+    for (size_t k = 0; k < CHECK_PARTS; ++k)
+        if (!c.fine[k])
+            return find_fault(context, mesh);
     return OVOID_OK;
 }
 
@@ -306,12 +253,12 @@ ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
     if (!mesh->component_of)
         return OVOID_ERROR_MEMORY;
     OV_TRY(ov_progress_ask(context));
-    OV_TRY(find_components(context, mesh));
+    OV_TRY(ov_components_find(context, mesh));
+    OV_TRY(ov_progress_ask(context));
+    OV_TRY(ov_components_measure(context, mesh));
     OV_TRY(ov_progress_ask(context));
     if (mesh->xyz)
         OV_TRY(check_edges(context, mesh));
-    OV_TRY(ov_progress_ask(context));
-    OV_TRY(measure_components(context, mesh));
     OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_mesh_expose(context, mesh));
 cleanup:
@@ -443,167 +390,4 @@ size_t ovoid_mesh_components(const ovoid_mesh *mesh) {
 
 const ovoid_component *ovoid_mesh_component(const ovoid_mesh *mesh, size_t index) {
     return mesh && index < mesh->components ? &mesh->component[index] : NULL;
-}
-
-/* ---- area and volume ---------------------------------------------------------------------- */
-
-ov_content ov_mesh_flat(const ovoid_mesh *mesh, bool outer_only) {
-    ov_content content = {0.0, 0.0};
-    for (size_t c = 0; c < mesh->components; ++c) {
-        if (outer_only && !mesh->component[c].outer)
-            continue;
-        content.area += mesh->component[c].area;
-        content.volume += mesh->component[c].volume;
-    }
-    return content;
-}
-
-/* A triangle bent to its normals: X(l) = sum_i l_i p_i + 4 sum_ij l_i l_j s_ij m_ij over the
- * barycentric coordinates l, where s_ij is the height of the middle of edge ij over its chord, m_ij
- * the mean normal there. A curve over the chord e with height 4 s t (1 - t) has slopes +-4 s / |e|
- * at its ends; normals are perpendicular to slopes, so that e . (n_j - n_i) = 8 s, in which odd
- * terms of the curve cancel. As s and m belong to the edge, neighbours meet without a gap: heights
- * over each flat triangle along its own normal would leave wedges at the edges, whose area is of
- * the same second order as what bending adds. */
-typedef struct bent_triangle {
-    double p[3][3]; /* corners */
-    double n[3][3]; /* normals there */
-    double b[3][3]; /* 4 s m of the edges 01, 12, 20 */
-} bent_triangle;
-
-static void bend(const ovoid_mesh *mesh, size_t triangle, const double *origin, bent_triangle *t) {
-    corners_at(mesh, triangle, t->p[0], t->p[1], t->p[2]);
-    for (size_t i = 0; i < 3; ++i) {
-        const size_t v = mesh->corners[3 * triangle + i];
-        for (size_t k = 0; k < 3; ++k) {
-            t->p[i][k] -= origin[k];
-            t->n[i][k] = mesh->normals[3 * v + k];
-        }
-    }
-    for (size_t i = 0; i < 3; ++i) {
-        const size_t j = (i + 1) % 3;
-        double edge[3], turn[3], mean[3];
-        subtract(t->p[j], t->p[i], edge);
-        subtract(t->n[j], t->n[i], turn);
-        for (size_t k = 0; k < 3; ++k)
-            mean[k] = t->n[i][k] + t->n[j][k];
-        const double length = sqrt(dot(mean, mean));
-        const double height = length > 1e-3 ? 0.5 * dot(edge, turn) / length : 0.0;
-        for (size_t k = 0; k < 3; ++k)
-            t->b[i][k] = height * mean[k];
-    }
-}
-
-/* Dunavant's rule of degree 4, which the volume's integrand has: barycentric coordinates and
- * weights. */
-enum { NODES = 6 };
-#define NEAR 0.445948490915965
-#define FAR 0.091576213509771
-#define NEAR_WEIGHT 0.223381589678011
-#define FAR_WEIGHT 0.109951743655322
-#define NEAR_APEX (1.0 - 2.0 * NEAR)
-#define FAR_APEX (1.0 - 2.0 * FAR)
-static const double node[3][NODES] = {{NEAR_APEX, NEAR, NEAR, FAR_APEX, FAR, FAR},
-                                      {NEAR, NEAR_APEX, NEAR, FAR, FAR_APEX, FAR},
-                                      {NEAR, NEAR, NEAR_APEX, FAR, FAR, FAR_APEX}};
-static const double node_weight[NODES] = {NEAR_WEIGHT, NEAR_WEIGHT, NEAR_WEIGHT,
-                                          FAR_WEIGHT,  FAR_WEIGHT,  FAR_WEIGHT};
-
-/* The area's integrand is the vector area along the interpolated normal: signed, so that what
- * bending folds over in a needle of a triangle counts for nothing. All nodes go side by side, which
- * compilers turn into vectors. */
-static void integrate_bent(const bent_triangle *t, ov_content *content) {
-    double x[3][NODES], n[3][NODES], u[3][NODES], v[3][NODES];
-    for (size_t k = 0; k < 3; ++k) {
-        const double *const p0 = t->p[0], *const p1 = t->p[1], *const p2 = t->p[2];
-        const double b0 = t->b[0][k], b1 = t->b[1][k], b2 = t->b[2][k];
-        const double u0 = p1[k] - p0[k], v0 = p2[k] - p0[k];
-        for (size_t q = 0; q < NODES; ++q) {
-            const double l0 = node[0][q], l1 = node[1][q], l2 = node[2][q];
-            x[k][q] =
-                l0 * p0[k] + l1 * p1[k] + l2 * p2[k] + l0 * l1 * b0 + l1 * l2 * b1 + l2 * l0 * b2;
-            n[k][q] = l0 * t->n[0][k] + l1 * t->n[1][k] + l2 * t->n[2][k];
-            u[k][q] = u0 + (l0 - l1) * b0 + l2 * (b1 - b2);
-            v[k][q] = v0 + (l0 - l2) * b2 + l1 * (b1 - b0);
-        }
-    }
-    double volume[NODES], along[NODES], square[NODES];
-    for (size_t q = 0; q < NODES; ++q) {
-        const double a0 = u[1][q] * v[2][q] - u[2][q] * v[1][q],
-                     a1 = u[2][q] * v[0][q] - u[0][q] * v[2][q],
-                     a2 = u[0][q] * v[1][q] - u[1][q] * v[0][q];
-        volume[q] = x[0][q] * a0 + x[1][q] * a1 + x[2][q] * a2;
-        along[q] = n[0][q] * a0 + n[1][q] * a1 + n[2][q] * a2;
-        square[q] = n[0][q] * n[0][q] + n[1][q] * n[1][q] + n[2][q] * n[2][q];
-    }
-    for (size_t q = 0; q < NODES; ++q) {
-        if (square[q] > 1e-6)
-            content->area += 0.5 * node_weight[q] * along[q] / sqrt(square[q]);
-        content->volume += node_weight[q] / 6.0 * volume[q];
-    }
-}
-
-void ov_mesh_smooth_triangle(const ovoid_mesh *mesh, size_t triangle, const double origin[3],
-                             ov_content *content) {
-    bent_triangle bent;
-    bend(mesh, triangle, origin, &bent);
-    integrate_bent(&bent, content);
-}
-
-/* Bending adds the areas between the edges and their chords: over a chord e the curve encloses with
- * it b x e / 6, where b is four times its height. */
-void ov_mesh_smooth_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]) {
-    const double zero[3] = {0.0, 0.0, 0.0};
-    bent_triangle bent;
-    ov_mesh_flat_vector(mesh, triangle, vector);
-    bend(mesh, triangle, zero, &bent);
-    for (size_t i = 0; i < 3; ++i) {
-        double edge[3], area[3];
-        subtract(bent.p[(i + 1) % 3], bent.p[i], edge);
-        cross(bent.b[i], edge, area);
-        for (size_t k = 0; k < 3; ++k)
-            vector[k] += area[k] / 6.0;
-    }
-}
-
-ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
-                             bool outer_only, ov_content *result) {
-    ovoid_status status = OVOID_OK;
-    ov_content content = {0.0, 0.0};
-    double origin[3] = {0.0, 0.0, 0.0};
-    if (mesh->vertices > 0)
-        ov_mesh_at(mesh, 0, origin);
-    for (size_t t = 0; smooth && t < mesh->triangles; ++t) {
-        OV_TRY(ov_progress_turn(context, t, mesh->triangles));
-        if (outer_only && !ov_mesh_component_of_triangle(mesh, t)->outer)
-            continue;
-        bent_triangle bent;
-        bend(mesh, t, origin, &bent);
-        integrate_bent(&bent, &content);
-    }
-    *result = smooth ? content : ov_mesh_flat(mesh, outer_only);
-cleanup:
-    return status;
-}
-
-ov_content ov_mesh_smooth(const ovoid_mesh *mesh, bool outer_only) {
-    ov_content content = {0.0, 0.0};
-    (void)ov_mesh_content(NULL, mesh, true, outer_only, &content); /* nobody stops it */
-    return content;
-}
-
-double ovoid_mesh_area(const ovoid_mesh *mesh) {
-    return mesh ? ov_mesh_flat(mesh, false).area : NAN;
-}
-
-double ovoid_mesh_volume(const ovoid_mesh *mesh) {
-    return mesh ? ov_mesh_flat(mesh, false).volume : NAN;
-}
-
-double ovoid_mesh_smooth_area(const ovoid_mesh *mesh) {
-    return mesh ? ov_mesh_smooth(mesh, false).area : NAN;
-}
-
-double ovoid_mesh_smooth_volume(const ovoid_mesh *mesh) {
-    return mesh ? ov_mesh_smooth(mesh, false).volume : NAN;
 }

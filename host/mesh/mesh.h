@@ -105,8 +105,8 @@ void ov_mesh_flat_triangle(const ovoid_mesh *mesh, size_t triangle, const double
 void ov_mesh_smooth_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]);
 void ov_mesh_flat_vector(const ovoid_mesh *mesh, size_t triangle, double vector[3]);
 
-/* Either of them, asking on the way whether to go on. */
-ovoid_status ov_mesh_content(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
-                             bool outer_only, ov_content *result);
+/* Those of all components, and of the outer ones, asking on the way whether to go on. */
+ovoid_status ov_mesh_contents(ovoid_context *context, const ovoid_mesh *mesh, bool smooth,
+                              ov_content *whole, ov_content *outer);
 
 #endif

@@ -326,7 +326,7 @@ static void what_is_far_is_found_in_images(void **state) {
     test_skip_simulated(*state);
     for (size_t n = 0; n < 4; ++n)
         of[n] = screw(0.25 * (double)n, 0.0);
-    ovoid_molecule *molecule = assembly(*state, 120, 25.0, 0.0, 0.0, of, 4);
+    ovoid_molecule *molecule = assembly(*state, 120, 60.0, 0.0, 0.0, of, 4);
     const ovoid_measures whole = expect_measured_by_unit(*state, molecule, of, 4, 0.0, 0.14);
     assert_true(whole.deviation > 6.0);
     ovoid_molecule_destroy(&molecule);

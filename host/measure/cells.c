@@ -148,21 +148,26 @@ cleanup:
     return status;
 }
 
-/* The terms that make the surfaces in a cell and its halo what they are; none where these are kept.
- */
+/* So far about a cell, angstrom, the terms make the surfaces in it and its halo what they are; and
+ * those of atoms tell which image a place of it belongs to. */
+static double reach_of(const job *j, size_t n) {
+    const double reach = j->options.halo + OV_SURVEY_ROOM * j->options.spacing;
+    return n == 0 && j->images.count > 1 ? fmax(reach, j->ends.nearest) : reach;
+}
+
+/* All that cell c takes; none where its surfaces are kept. */
 static ovoid_status take_terms(const job *j, ovoid_context *context, desk *d, size_t c,
                                ov_survey_terms *terms) {
-    const double reach = j->options.halo + OV_SURVEY_ROOM * j->options.spacing;
-    ov_box box = box_of(j, c);
     d->options.cell = (uint32_t)c;
     d->options.image = NULL;
     if (j->kept[c])
         return OVOID_OK;
-    for (size_t k = 0; k < 3; ++k) {
-        box.low[k] -= reach;
-        box.high[k] += reach;
-    }
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+        ov_box box = box_of(j, c);
+        for (size_t k = 0; k < 3; ++k) {
+            box.low[k] -= reach_of(j, n);
+            box.high[k] += reach_of(j, n);
+        }
         const ovoid_status status =
             ov_shelf_take(context, &j->shelf[n], &j->images, &box, &d->taken[n]);
         if (status != OVOID_OK)

@@ -37,8 +37,8 @@ static void include(const double at[3], double about, ov_box *box) {
 }
 
 /* Finds the image with the atom nearest to a place, and the place as it lies to the unit from
- * there. False: none is within the grid's reach. */
-static bool find_nearest(const finder *f, int grid, const double place[3], double nearest[3]) {
+ * there; how far it is from it, INFINITY: further than the grid reaches. */
+static double find_nearest(const finder *f, int grid, const double place[3], double nearest[3]) {
     double least = INFINITY;
     for (size_t g = 0; g < f->images && !(grid == NEAR && isfinite(least)); ++g) {
         double at[3], square = 0.0;
@@ -54,21 +54,22 @@ static bool find_nearest(const finder *f, int grid, const double place[3], doubl
         least = square;
         memcpy(nearest, at, sizeof at);
     }
-    return isfinite(least);
+    return sqrt(least);
 }
 
 /* A place where the surface may be: what is near an atom is within the box about all of them. */
 static void add_place(finder *f, const double place[3]) {
     double nearest[3];
-    if (find_nearest(f, NEAR, place, nearest))
+    if (isfinite(find_nearest(f, NEAR, place, nearest)))
         return;
-    const bool far = !find_nearest(f, FAR, place, nearest);
-    if (far && !find_nearest(f, FURTHEST, place, nearest)) {
+    double off = find_nearest(f, FAR, place, nearest);
+    if (isinf(off))
+        off = find_nearest(f, FURTHEST, place, nearest);
+    if (isinf(off)) {
         f->ends.scattered = true;
         return;
     }
-    if (far)
-        f->ends.nearest = within[FURTHEST];
+    f->ends.nearest = fmax(f->ends.nearest, off + within[NEAR]);
     include(nearest, within[NEAR], &f->ends.box);
 }
 
@@ -126,7 +127,7 @@ ovoid_status ov_unit_find_ends(ovoid_context *context, const ovoid_field *origin
     for (size_t i = 0; i < f.count; ++i)
         include(f.atoms[i].centre, 0.0, &f.box);
     f.ends.box = f.box;
-    f.ends.nearest = within[FAR];
+    f.ends.nearest = 2.0 * within[NEAR];
     for (size_t k = 0; k < 3; ++k) {
         f.ends.box.low[k] -= within[NEAR];
         f.ends.box.high[k] += within[NEAR];

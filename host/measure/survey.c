@@ -173,13 +173,36 @@ static void find_place(const ov_surveyor *s, const ovoid_mesh *mesh, size_t tria
     }
 }
 
+/* Whether a place that is less than `off` away along each axis is in the cell: 1, or 0 where it is
+ * not; -1: that depends on where it is. */
+static int is_surely_inside(const ov_surveyor *s, const double at[3], double off) {
+    int inside = 1;
+    for (size_t k = 0; k < 3; ++k) {
+        if (at[k] < s->low[k] - off || at[k] > s->high[k] + off)
+            return 0;
+        if (at[k] < s->low[k] + off || at[k] > s->high[k] - off)
+            inside = -1;
+    }
+    return inside;
+}
+
+/* The middle of a cube is less than a step from the centre of any triangle in it, and from that of
+ * one in its low face. */
 static bool is_inside(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangle) {
     double centre[3];
-    bool inside = true;
-    find_place(s, mesh, triangle, centre);
-    for (size_t k = 0; k < 3; ++k)
-        inside = inside && centre[k] >= s->low[k] && centre[k] < s->high[k];
-    return inside && (!s->options->image || image_at(s, centre) == 0);
+    ov_mesh_centre(mesh, triangle, centre);
+    int inside = is_surely_inside(s, centre, s->options->spacing);
+    if (inside < 0) {
+        find_place(s, mesh, triangle, centre);
+        inside = 1;
+        for (size_t k = 0; k < 3; ++k)
+            inside = inside && centre[k] >= s->low[k] && centre[k] < s->high[k];
+    }
+    if (inside && s->options->image) {
+        find_place(s, mesh, triangle, centre);
+        return image_at(s, centre) == 0;
+    }
+    return inside;
 }
 
 /* Whether a triangle that is not in the cell is near enough for its place to be right: as far out

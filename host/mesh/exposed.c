@@ -5,11 +5,13 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* ---- vertices near to each other ------------------------------------------------------------- */
 
 /* The vertices that are not of the largest set, and the lattice cells in which a vertex may be near
- * to one of them: most vertices are in none, which is soon seen. */
+ * to one of them: most vertices are in none, and most of the others in one that only their own set
+ * comes near, which is soon seen. Vertices that follow one another are often in one cell. */
 typedef struct minority {
     const ovoid_mesh *mesh;
     const uint32_t *set_of;
@@ -17,11 +19,16 @@ typedef struct minority {
     size_t count;
     ov_grid grid;
     ov_cells about;
+    uint32_t *only; /* of each cell: the one set that comes near, or SEVERAL */
+    size_t only_capacity;
 } minority;
+
+#define SEVERAL OV_NO_SET
 
 static void minority_destroy(minority *m) {
     ov_grid_destroy(&m->grid);
     ov_cells_destroy(&m->about);
+    free(m->only);
 }
 
 static ovoid_status find_largest(ovoid_context *context, minority *m, size_t sets) {
@@ -63,24 +70,45 @@ static void find_box(const minority *m, double low[3], double high[3]) {
     }
 }
 
-/* The cell of a place and those about it. */
-static ovoid_status add_about(ovoid_context *context, minority *m, const double at[3]) {
+/* Set `set` comes near what is in the cell in the middle, or about it. */
+static ovoid_status add_about(ovoid_context *context, minority *m, const int32_t middle[3],
+                              uint32_t set) {
     ovoid_status status = OVOID_OK;
-    int32_t middle[3];
-    ov_cells_place(&m->about, at, middle);
     for (int n = 0; n < 27 && status == OVOID_OK; ++n) {
         const int32_t place[3] = {middle[0] + n % 3 - 1, middle[1] + n / 3 % 3 - 1,
                                   middle[2] + n / 9 - 1};
         uint32_t number;
         bool added;
-        status = ov_cells_add(context, &m->about, place, &number, &added);
+        OV_TRY(ov_cells_add(context, &m->about, place, &number, &added));
+        OV_TRY(ov_grow(context, &m->only, &m->only_capacity, (size_t)number + 1, sizeof *m->only,
+                       "cells"));
+        m->only[number] = added || m->only[number] == set ? set : SEVERAL;
     }
+cleanup:
     return status;
+}
+
+/* The place of one vertex after the other, and whether it is another one than that before. */
+typedef struct walk {
+    int32_t place[3];
+    uint32_t set; /* of the last */
+    bool begun;
+} walk;
+
+static bool move_on(walk *w, const ov_cells *cells, const double at[3], uint32_t set) {
+    int32_t place[3];
+    ov_cells_place(cells, at, place);
+    const bool same = w->begun && w->set == set && memcmp(place, w->place, sizeof place) == 0;
+    memcpy(w->place, place, sizeof place);
+    w->set = set;
+    w->begun = true;
+    return !same;
 }
 
 static ovoid_status gather(ovoid_context *context, minority *m, double reach) {
     ovoid_status status = OVOID_OK;
     double low[3], high[3], at[3];
+    walk w = {.begun = false};
     find_box(m, low, high);
     OV_TRY(ov_grid_create(context, low, high, reach, m->count, m->mesh->vertices, &m->grid));
     OV_TRY(ov_cells_create(context, low, m->grid.cells.edge, m->count, &m->about));
@@ -89,7 +117,8 @@ static ovoid_status gather(ovoid_context *context, minority *m, double reach) {
             continue;
         ov_mesh_at(m->mesh, v, at);
         OV_TRY(ov_grid_add(context, &m->grid, at, (uint32_t)v));
-        OV_TRY(add_about(context, m, at));
+        if (move_on(&w, &m->about, at, m->set_of[v]))
+            OV_TRY(add_about(context, m, w.place, m->set_of[v]));
     }
 cleanup:
     return status;
@@ -106,6 +135,30 @@ static ovoid_status tell(const minority *m, uint32_t v, const double at[3], ov_n
     return status;
 }
 
+/* Whether a vertex of this set in the cell may be near to one of another. */
+static bool may_be_near(const minority *m, const int32_t place[3], uint32_t set) {
+    const uint32_t number = ov_cells_find(&m->about, place);
+    return number != OV_NO_CELL && m->only[number] != set;
+}
+
+static ovoid_status tell_all(const minority *m, ov_near_found found, void *user) {
+    ovoid_status status = OVOID_OK;
+    walk w = {.begun = false};
+    bool near = false;
+    for (size_t v = 0; v < m->mesh->vertices; ++v) {
+        double at[3];
+        if (m->set_of[v] == OV_NO_SET)
+            continue;
+        ov_mesh_at(m->mesh, v, at);
+        if (move_on(&w, &m->about, at, m->set_of[v]))
+            near = may_be_near(m, w.place, m->set_of[v]);
+        if (near)
+            OV_TRY(tell(m, (uint32_t)v, at, found, user));
+    }
+cleanup:
+    return status;
+}
+
 ovoid_status ov_mesh_near_sets(ovoid_context *context, const ovoid_mesh *mesh,
                                const uint32_t *set_of, size_t sets, double reach,
                                ov_near_found found, void *user) {
@@ -117,16 +170,7 @@ ovoid_status ov_mesh_near_sets(ovoid_context *context, const ovoid_mesh *mesh,
     if (m.count == 0)
         goto cleanup;
     OV_TRY(gather(context, &m, reach));
-    for (size_t v = 0; v < mesh->vertices; ++v) {
-        double at[3];
-        int32_t place[3];
-        if (set_of[v] == OV_NO_SET)
-            continue;
-        ov_mesh_at(mesh, v, at);
-        ov_cells_place(&m.about, at, place);
-        if (ov_cells_find(&m.about, place) != OV_NO_CELL)
-            OV_TRY(tell(&m, (uint32_t)v, at, found, user));
-    }
+    OV_TRY(tell_all(&m, found, user));
 cleanup:
     minority_destroy(&m);
     return status;

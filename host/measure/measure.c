@@ -88,7 +88,8 @@ static ovoid_status compare_vertices(ovoid_context *context, const ovoid_mesh *o
     }
     OV_TRY(ov_mesh_distances(context, original, sparse, false, &measures->distances, first, second,
                              &bound));
-    measures->deviation = fmax(largest_of_exposed(original, first), largest_of_exposed(sparse, second));
+    measures->deviation =
+        fmax(largest_of_exposed(original, first), largest_of_exposed(sparse, second));
     measures->deviation_bound = fmax(bound.most, measures->deviation);
 cleanup:
     free(first);

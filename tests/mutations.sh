@@ -46,7 +46,7 @@ host/fit/adaptive/adaptive.c|+adaptive|calibration in the wrong direction|s/(1.0
 host/fit/adaptive/local.c|local|points are not found anew|s/m->escaped =$/m->escaped = false \&\&/
 host/fit/adaptive/merge.c|merge|a split forgets the variance|s/half.decay\[2\] \/= shrink;//
 host/measure/judge.c|judge|spots are not thinned|s/if (square < apart \* apart)/if (false)/
-host/mesh/mesh.c|mesh|walls of cavities are outer|s/mesh->component\[c\].outer = mesh->component\[c\].volume > 0.0;/mesh->component[c].outer = true;/
+host/mesh/components.c|mesh|walls of cavities are outer|s/mesh->component\[c\].outer = mesh->component\[c\].volume > 0.0;/mesh->component[c].outer = true;/
 host/mixture/reduce.c|reduce|partners that are used up are not looked for again|s/if (list->next == list->count \&\& list->more)/if (false)/
 host/molecule/pqr.c|molecule|a PDB file is not suspected|s/return !pdb->cleared \&\& atoms > 1/return false \&\& atoms > 1/
 host/write/ccp4.c|map|the deviation of a map|s/of->squares \/ points - mean \* mean/of->squares \/ points/

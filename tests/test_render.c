@@ -187,6 +187,40 @@ static void thin_sheets_are_seen(void **state) {
     }
 }
 
+/* Rays so far apart that tiles have fewer of them, and steps follow the rays and not the narrowest
+ * term: balls on a lattice, each where it would be alone. */
+static void rays_far_apart_see_the_same(void **state) {
+    enum { BALLS = 64 };
+    const double r = 15.0, d = 0.05;
+    const uint32_t side = 100;
+    ov_quadric balls[BALLS + 1];
+    size_t met = 0;
+    if (test_small())
+        skip();
+    for (int n = 0; n < BALLS; ++n)
+        balls[n] =
+            atom(60.0 * (n % 8) - 210.0, 60.0 * (double)(n / 8) - 210.0, 7.0 * (n % 11), r, d);
+    balls[BALLS] = (ov_quadric){1e-3, {0.0, 0.0, 0.0}, {0.1, 0.0, 0.0, 0.1, 0.0, 30.0}};
+    view v = trace(*state, balls, BALLS + 1, 1.0, square_of_rays(side, side, 480.0));
+    for (uint32_t row = 0; row < side; ++row)
+        for (uint32_t column = 0; column < side; ++column) {
+            const size_t at = ov_rays_index(&v.rays, column, row);
+            double depth = -INFINITY;
+            for (int n = 0; n < BALLS; ++n) {
+                const double away = hypot(ray_x(&v.rays, column) - balls[n].centre[0],
+                                          ray_y(&v.rays, row) - balls[n].centre[1]);
+                if (away < r)
+                    depth = balls[n].centre[2] + sqrt(r * r - away * away);
+            }
+            assert_int_equal(v.depth[at] > OV_NOWHERE, depth > -INFINITY);
+            if (depth > -INFINITY)
+                expect_near(v.depth[at], depth, 2e-3, "a depth");
+            met += depth > -INFINITY;
+        }
+    assert_in_range(met, 1500, 2500);
+    destroy_view(&v);
+}
+
 /* Boxes of tiles and slabs that are many, and far apart. */
 static void deep_scenes_work(void **state) {
     const ov_quadric two[] = {atom(-2.0, 0.0, 20000.0, 1.5, 0.5),
@@ -958,6 +992,7 @@ int main(void) {
         cmocka_unit_test(nearest_sphere_is_seen),
         cmocka_unit_test(rays_are_the_references),
         cmocka_unit_test(thin_sheets_are_seen),
+        cmocka_unit_test(rays_far_apart_see_the_same),
         cmocka_unit_test(deep_scenes_work),
         cmocka_unit_test(ellipsoids_are_seen_singly),
         cmocka_unit_test(comparison_is_the_formula),

@@ -197,6 +197,166 @@ static void units_add_up(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* ---- measures -------------------------------------------------------------------------------- */
+
+/* The unit's atoms as ellipsoids, each somewhere else by up to so much, and all of them turned
+ * about the axis. */
+static ovoid_model *placed_model(ovoid_context *context, const ovoid_molecule *molecule,
+                                 const ov_rigid *motions, size_t order, double off, double turns) {
+    const size_t unit = ovoid_molecule_unit_atoms(molecule);
+    const ov_rigid turn = screw(turns, 0.0);
+    ovoid_ellipsoid *const of = test_alloc(unit, sizeof *of);
+    ovoid_motion *const placements = test_alloc(order, sizeof *placements);
+    ovoid_model *model = NULL;
+    for (size_t n = 0; n < unit; ++n) {
+        const double *const atom = ovoid_molecule_unit_xyzr(molecule) + 4 * n;
+        of[n] = (ovoid_ellipsoid){.amplitude = exp(0.5 * atom[3] * atom[3]),
+                                  .decay = {0.55, 0.5, 0.45},
+                                  .angle = {0.1 * (double)n, 0.3, 0.7}};
+        ov_rigid_move(&turn, atom, of[n].centre);
+        of[n].centre[n % 3] += off * sin((double)n);
+    }
+    for (size_t g = 0; g < order; ++g) {
+        memcpy(placements[g].rotation, motions[g].rotation, sizeof motions[g].rotation);
+        memcpy(placements[g].translation, motions[g].shift, sizeof motions[g].shift);
+    }
+    test_check(context,
+               ovoid_model_create_placed(context, of, unit, placements, order, 0.5, 1.0, &model));
+    free(of);
+    free(placements);
+    return model;
+}
+
+static ovoid_measures compare(ovoid_context *context, const ovoid_molecule *molecule,
+                              const ovoid_model *model, uint32_t cell_atoms) {
+    ovoid_field *original = NULL, *sparse = NULL;
+    ovoid_measure_options options;
+    ovoid_measures measures;
+    ovoid_measure_options_init(&options, sizeof options);
+    ovoid_measures_init(&measures, sizeof measures);
+    options.cell_atoms = cell_atoms;
+    test_check(context, ovoid_field_of_molecule(context, molecule, 0.5, 1.0, &original));
+    test_check(context, ovoid_field_of_model(context, model, &sparse));
+    test_check(context, ovoid_measure(context, original, sparse, &options, &measures));
+    ovoid_field_destroy(&original);
+    ovoid_field_destroy(&sparse);
+    return measures;
+}
+
+static void expect_pair(ovoid_pair got, ovoid_pair wanted, double share, const char *what) {
+    expect_near(got.original, wanted.original, share * wanted.original, what);
+    expect_near(got.sparse, wanted.sparse, share * wanted.sparse, what);
+}
+
+static void expect_distances(const ovoid_distances *got, const ovoid_distances *wanted) {
+    expect_near(got->forward, wanted->forward, 0.15, "a distance");
+    expect_near(got->backward, wanted->backward, 0.15, "a distance");
+    expect_near(got->mean, wanted->mean, 1e-2 * wanted->mean, "a mean distance");
+    expect_near(got->rms, wanted->rms, 1e-2 * wanted->rms, "a root mean square distance");
+}
+
+static void expect_same_measures(const ovoid_measures *got, const ovoid_measures *wanted) {
+    print_message(
+        "pieces %llu %llu (outer %llu %llu) of %llu %llu (%llu %llu), area %g of %g, "
+        "deviation %g of %g, outer mean %g of %g\n",
+        (unsigned long long)got->components_original, (unsigned long long)got->components_sparse,
+        (unsigned long long)got->outer_original, (unsigned long long)got->outer_sparse,
+        (unsigned long long)wanted->components_original,
+        (unsigned long long)wanted->components_sparse, (unsigned long long)wanted->outer_original,
+        (unsigned long long)wanted->outer_sparse, got->area.original, wanted->area.original,
+        got->deviation, wanted->deviation, got->distances_outer.mean, wanted->distances_outer.mean);
+    assert_int_equal(got->outer_original, wanted->outer_original);
+    assert_int_equal(got->outer_sparse, wanted->outer_sparse);
+    expect_pair(got->area, wanted->area, 2e-3, "area");
+    expect_pair(got->volume, wanted->volume, 2e-3, "volume");
+    expect_pair(got->area_outer, wanted->area_outer, 2e-3, "outer area");
+    expect_pair(got->volume_outer, wanted->volume_outer, 2e-3, "outer volume");
+    expect_distances(&got->distances, &wanted->distances);
+    expect_distances(&got->distances_outer, &wanted->distances_outer);
+    expect_near(got->deviation, wanted->deviation, 0.15, "deviation");
+}
+
+/* What a unit among its images says of all of it, against the whole of it. */
+static ovoid_measures expect_measured_by_unit(ovoid_context *context,
+                                              const ovoid_molecule *molecule,
+                                              const ov_rigid *motions, size_t order, double off,
+                                              double turns) {
+    const uint32_t unit = (uint32_t)ovoid_molecule_unit_atoms(molecule);
+    const uint32_t sizes[] = {unit, unit / 5};
+    ovoid_model *placed = placed_model(context, molecule, motions, order, off, turns);
+    ovoid_model *all = NULL;
+    test_check(context, ovoid_model_expand(context, placed, &all));
+    const ovoid_measures wanted = compare(context, molecule, all, 0);
+    for (size_t k = 0; k < 2; ++k) {
+        const ovoid_measures got = compare(context, molecule, placed, sizes[k]);
+        const double more = fabs(got.area.original - wanted.area.original);
+        expect_same_measures(&got, &wanted);
+        assert_true(more > 1e-8 * wanted.area.original); /* of another lattice */
+    }
+    ovoid_model_destroy(&placed);
+    ovoid_model_destroy(&all);
+    return wanted;
+}
+
+static void measures_are_those_of_the_whole(void **state) {
+    const ov_rigid of[3] = {screw(0.0, 0.0), screw(1.0 / 3.0, 0.0), screw(2.0 / 3.0, 0.0)};
+    test_skip_simulated(*state);
+    ovoid_molecule *molecule = assembly(*state, 700, 11.0, 0.0, 50.0, of, 3);
+    expect_measured_by_unit(*state, molecule, of, 3, 0.4, 0.0);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Pairs across an axis of two, three of them: how many there are is known of none of them. */
+static void pieces_across_seams_are_counted(void **state) {
+    ov_rigid of[6];
+    test_skip_simulated(*state);
+    for (size_t n = 0; n < 6; ++n) {
+        const ov_rigid turn = screw((double)(n % 3) / 3.0, 0.0);
+        of[n] = n < 3 ? turn : ov_rigid_after(&flip, &turn);
+    }
+    ovoid_molecule *molecule = assembly(*state, 150, 40.0, 3.0, 2.0, of, 6);
+    const ovoid_measures whole = expect_measured_by_unit(*state, molecule, of, 6, 0.3, 0.0);
+    assert_int_equal(whole.outer_original, 3);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* The model's units lie between those of the molecule, each as near to an image. */
+static void what_is_far_is_found_in_images(void **state) {
+    ov_rigid of[4];
+    test_skip_simulated(*state);
+    for (size_t n = 0; n < 4; ++n)
+        of[n] = screw(0.25 * (double)n, 0.0);
+    ovoid_molecule *molecule = assembly(*state, 120, 60.0, 0.0, 0.0, of, 4);
+    const ovoid_measures whole = expect_measured_by_unit(*state, molecule, of, 4, 0.0, 0.14);
+    assert_true(whole.deviation > 6.0);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* An ellipsoid that no atom is near is of no unit: all of them are measured. */
+static void what_is_of_no_unit_is_measured(void **state) {
+    const ov_rigid of[2] = {screw(0.0, 0.0), screw(0.5, 0.0)};
+    test_skip_simulated(*state);
+    ovoid_molecule *molecule = assembly(*state, 60, 15.0, 0.0, 0.0, of, 2);
+    ovoid_model *near = placed_model(*state, molecule, of, 2, 0.3, 0.0), *far = NULL, *all = NULL;
+    ovoid_ellipsoid *const unit = test_alloc(60, sizeof *unit);
+    memcpy(unit, ovoid_model_unit_ellipsoids(near), 60 * sizeof *unit);
+    unit[7].centre[2] += 200.0;
+    test_check(*state,
+               ovoid_model_create_placed(*state, unit, 60, ovoid_model_placements(near, NULL), 2,
+                                         0.5, 1.0, &far));
+    test_check(*state, ovoid_model_expand(*state, far, &all));
+    const ovoid_measures got = compare(*state, molecule, far, 30),
+                         wanted = compare(*state, molecule, all, 0);
+    expect_same_measures(&got, &wanted);
+    assert_int_equal(got.outer_sparse, got.outer_original + 2);
+    assert_true(got.deviation > 150.0);
+    free(unit);
+    ovoid_model_destroy(&near);
+    ovoid_model_destroy(&far);
+    ovoid_model_destroy(&all);
+    ovoid_molecule_destroy(&molecule);
+}
+
 /* ---- fits ------------------------------------------------------------------------------------ */
 
 static ovoid_model *fit(ovoid_context *context, const ovoid_molecule *molecule,
@@ -435,6 +595,10 @@ int main(void) {
         cmocka_unit_test(groups_are_found),
         cmocka_unit_test(units_of_several_placements_are_found),
         cmocka_unit_test(units_add_up),
+        cmocka_unit_test(measures_are_those_of_the_whole),
+        cmocka_unit_test(pieces_across_seams_are_counted),
+        cmocka_unit_test(what_is_far_is_found_in_images),
+        cmocka_unit_test(what_is_of_no_unit_is_measured),
         cmocka_unit_test(models_are_units_and_motions),
         cmocka_unit_test(units_stand_for_all),
         cmocka_unit_test(seams_at_an_axis_are_mended),

@@ -55,3 +55,26 @@ ov_rigid ov_rigid_after(const ov_rigid *first, const ov_rigid *second) {
     ov_rigid_move(second, first->shift, made.shift);
     return made;
 }
+
+void ov_rigid_centre(const ov_rigid *motions, size_t count, double centre[3]) {
+    for (size_t k = 0; k < 3; ++k) {
+        centre[k] = 0.0;
+        for (size_t g = 0; g < count; ++g) /* of the origin they make their shifts */
+            centre[k] += motions[g].shift[k] / (double)count;
+    }
+}
+
+size_t ov_rigid_find(const ov_rigid *motions, size_t count, const ov_rigid *wanted) {
+    size_t best = 0;
+    double most = -INFINITY;
+    for (size_t g = 0; g < count; ++g) {
+        double trace = 0.0; /* of the turn from the one to the other */
+        for (size_t k = 0; k < 9; ++k)
+            trace += motions[g].rotation[k] * wanted->rotation[k];
+        if (trace > most) {
+            most = trace;
+            best = g;
+        }
+    }
+    return best;
+}

@@ -5,6 +5,7 @@
 #define OV_RIGID_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 /* x' = rotation x + shift. */
 typedef struct ov_rigid {
@@ -27,5 +28,11 @@ ov_rigid ov_rigid_inverse(const ov_rigid *rigid);
 
 /* First the one, then the other. */
 ov_rigid ov_rigid_after(const ov_rigid *first, const ov_rigid *second);
+
+/* Of a group: where the axes of all its motions meet, the mean of what they make of any place. */
+void ov_rigid_centre(const ov_rigid *motions, size_t count, double centre[3]);
+
+/* The one of these motions that turns most like it: of a group the only one that may be it. */
+size_t ov_rigid_find(const ov_rigid *motions, size_t count, const ov_rigid *wanted);
 
 #endif

@@ -27,8 +27,7 @@
 /* What one of those who look at cells works with. */
 typedef struct desk {
     ov_survey_options options;
-    ov_body *body[OV_SURVEY_SIDES];
-    size_t count[OV_SURVEY_SIDES], capacity[OV_SURVEY_SIDES];
+    ov_taken taken[OV_SURVEY_SIDES];
     double meshing, busy; /* seconds */
 } desk;
 
@@ -36,8 +35,8 @@ typedef struct desk {
 typedef struct search {
     size_t cell;
     ov_survey_far **far;  /* the points */
-    ov_survey_far *found; /* as they are when the cell has been looked at */
-    size_t count;
+    ov_survey_far *found; /* as they lie to the cell, and are when it has been looked at */
+    size_t count, far_capacity, found_capacity;
 } search;
 
 typedef struct job {
@@ -47,6 +46,10 @@ typedef struct job {
     desk *desk; /* of each hand */
     ov_shelf shelf[OV_SURVEY_SIDES];
     size_t lead; /* the side whose parts are the cells */
+    ov_survey_images images;
+    double centre[3]; /* of the images */
+    ov_rigid *back;   /* from each image to the unit */
+    ov_unit_ends ends;
     ov_survey_cell *cell;
     ov_survey_kept **kept; /* of each cell; NULL: nothing is */
     bool *keeps;           /* cells whose surfaces are to be kept */
@@ -58,14 +61,19 @@ typedef struct job {
     search *search; /* those under way */
 } job;
 
-static const ov_box *box_of(const job *j, size_t c) {
-    return &j->shelf[j->lead].cut.part[c].cell;
+static ov_box box_of(const job *j, size_t c) {
+    ov_box box = j->shelf[j->lead].cut.part[c].cell;
+    for (size_t k = 0; j->images.count > 1 && k < 3; ++k) {
+        box.low[k] = fmax(box.low[k], j->ends.box.low[k]);
+        box.high[k] = fmin(box.high[k], j->ends.box.high[k]);
+    }
+    return box;
 }
 
 static void destroy(job *j) {
     for (size_t h = 0; j->desk && h < ov_hands_count(j->hands); ++h)
         for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
-            free(j->desk[h].body[n]);
+            ov_taken_destroy(&j->desk[h].taken[n]);
     ov_hands_destroy(&j->hands);
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n)
         ov_shelf_destroy(&j->shelf[n]);
@@ -78,6 +86,7 @@ static void destroy(job *j) {
     free(j->cell);
     free(j->kept);
     free(j->late);
+    free(j->back);
     ov_survey_standing_destroy(&j->standing);
 }
 
@@ -95,15 +104,39 @@ cleanup:
     return status;
 }
 
-static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES], size_t most) {
+/* The images of a unit, and what is told of them from its shelves. */
+static ovoid_status prepare_images(job *j, const ov_repeat *repeat) {
+    ovoid_status status = OVOID_OK;
+    j->back = ov_alloc(j->context, repeat->order, sizeof *j->back, "seams between units");
+    if (!j->back)
+        return OVOID_ERROR_MEMORY;
+    for (size_t g = 0; g < repeat->order; ++g)
+        j->back[g] = ov_rigid_inverse(&repeat->motion[g]);
+    ov_rigid_centre(repeat->motion, repeat->order, j->centre);
+    j->images = (ov_survey_images){.image = repeat->motion,
+                                   .count = repeat->order,
+                                   .spacing = j->options.spacing,
+                                   .centre = j->centre};
+    OV_TRY(ov_unit_find_ends(j->context, j->shelf[0].field, j->shelf[1].field, j->options.isovalue,
+                             j->back, repeat->order, &j->ends));
+    j->options.nearest = j->ends.nearest;
+cleanup:
+    return status;
+}
+
+static ovoid_status prepare(job *j, const ovoid_field *fields[OV_SURVEY_SIDES],
+                            const ov_cells_options *how) {
     ovoid_status status = OVOID_OK;
     const double least = OV_MARCH_CUTOFF * j->options.isovalue;
     j->lead = fields[0]->count >= fields[1]->count ? 0 : 1;
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
         OV_TRY(ov_field_check_ellipsoids(j->context, fields[n], j->options.isovalue));
-        OV_TRY(ov_shelf_create(j->context, fields[n], n == j->lead ? most : SHELF, least,
+        OV_TRY(ov_field_place(j->context, fields[n]));
+        OV_TRY(ov_shelf_create(j->context, fields[n], n == j->lead ? how->most : SHELF, least,
                                &j->shelf[n]));
     }
+    if (how->repeat)
+        OV_TRY(prepare_images(j, how->repeat));
     j->cells = j->shelf[j->lead].cut.count;
     j->cell = ov_alloc(j->context, j->cells, sizeof *j->cell, "cells of a surface");
     j->kept = ov_alloc(j->context, j->cells, sizeof *j->kept, "cells of a surface");
@@ -115,27 +148,35 @@ cleanup:
     return status;
 }
 
-/* The terms that make the surfaces in a cell and its halo what they are; none where these are kept.
- */
+/* So far about a cell, angstrom, the terms make the surfaces in it and its halo what they are; and
+ * those of atoms tell which image a place of it belongs to. */
+static double reach_of(const job *j, size_t n) {
+    const double reach = j->options.halo + OV_SURVEY_ROOM * j->options.spacing;
+    return n == 0 && j->images.count > 1 ? fmax(reach, j->ends.nearest) : reach;
+}
+
+/* All that cell c takes; none where its surfaces are kept. */
 static ovoid_status take_terms(const job *j, ovoid_context *context, desk *d, size_t c,
                                ov_survey_terms *terms) {
-    const double reach = j->options.halo + OV_SURVEY_ROOM * j->options.spacing;
-    ov_box box = *box_of(j, c);
     d->options.cell = (uint32_t)c;
+    d->options.image = NULL;
     if (j->kept[c])
         return OVOID_OK;
-    for (size_t k = 0; k < 3; ++k) {
-        box.low[k] -= reach;
-        box.high[k] += reach;
-    }
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
+        ov_box box = box_of(j, c);
+        for (size_t k = 0; k < 3; ++k) {
+            box.low[k] -= reach_of(j, n);
+            box.high[k] += reach_of(j, n);
+        }
         const ovoid_status status =
-            ov_shelf_take(context, &j->shelf[n], &box, &d->body[n], &d->count[n], &d->capacity[n]);
+            ov_shelf_take(context, &j->shelf[n], &j->images, &box, &d->taken[n]);
         if (status != OVOID_OK)
             return status;
-        terms->body[n] = d->body[n];
-        terms->count[n] = d->count[n];
+        terms->body[n] = d->taken[n].body;
+        terms->count[n] = d->taken[n].count;
     }
+    if (j->images.count > 1)
+        d->options.image = d->taken[0].image;
     return OVOID_OK;
 }
 
@@ -149,12 +190,12 @@ static void forget_fars(ov_survey_cell *cell) {
 
 static ovoid_status survey(const job *j, ovoid_context *context, desk *d, size_t c,
                            ov_survey_cell *cell, ov_survey_kept **kept) {
-    const ov_box *const box = box_of(j, c);
+    const ov_box box = box_of(j, c);
     const double began = ov_seconds();
     ov_survey_terms terms;
     ovoid_status status = take_terms(j, context, d, c, &terms);
     if (status == OVOID_OK)
-        status = ov_survey_bodies(context, &d->options, &terms, box->low, box->high, cell, kept);
+        status = ov_survey_bodies(context, &d->options, &terms, box.low, box.high, cell, kept);
     d->busy += ov_seconds() - began;
     return status;
 }
@@ -200,13 +241,13 @@ static ovoid_status survey_all(job *j) {
 /* Where an outer surface was taken for what it is not, or for nothing yet. */
 static ovoid_status correct(job *j, ovoid_context *context, desk *d, size_t c) {
     ovoid_status status = OVOID_OK;
-    const ov_box *const box = box_of(j, c);
+    const ov_box box = box_of(j, c);
     const double began = ov_seconds();
     ov_survey_terms terms;
     if (ov_survey_holds(&j->standing, &j->cell[c], c))
         return OVOID_OK;
     OV_TRY(take_terms(j, context, d, c, &terms));
-    OV_TRY(ov_survey_again(context, &d->options, &terms, box->low, box->high, &j->standing,
+    OV_TRY(ov_survey_again(context, &d->options, &terms, box.low, box.high, &j->standing,
                            j->kept[c], &j->cell[c]));
 cleanup:
     d->busy += ov_seconds() - began;
@@ -247,32 +288,45 @@ static void bound_far(const job *j, ov_survey_far *far) {
         }
 }
 
-/* Whether something in cell c may be nearer to it. */
-static bool may_be_near(const job *j, size_t c, const ov_survey_far *far) {
-    return far->cell != c && j->cell[c].side[1 - far->side].pieces > 0 &&
-           distance_to(box_of(j, c), far->at) < far->distance;
+/* Whether something in cell c, or in image g of it, may be nearer to it. at gets where the point
+ * lies to the cell from there. */
+static bool may_be_near(const job *j, size_t c, size_t g, const ov_survey_far *far, double at[3]) {
+    const ov_box box = box_of(j, c);
+    if (j->cell[c].side[1 - far->side].pieces == 0 || (g == 0 && far->cell == c))
+        return false;
+    memcpy(at, far->at, sizeof far->at);
+    if (g > 0)
+        ov_rigid_move(&j->back[g], far->at, at);
+    return distance_to(&box, at) < far->distance;
+}
+
+static ovoid_status add_search(const job *j, ov_survey_far *far, const double at[3], search *made) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_grow(j->context, &made->far, &made->far_capacity, made->count + 1, sizeof(void *),
+                   "points that are far"));
+    OV_TRY(ov_grow(j->context, &made->found, &made->found_capacity, made->count + 1,
+                   sizeof *made->found, "points that are far"));
+    made->far[made->count] = far;
+    made->found[made->count] = *far;
+    memcpy(made->found[made->count++].at, at, sizeof far->at);
+cleanup:
+    return status;
 }
 
 /* Copies of the points change until all searches under way have ended, so that none of them
  * depends on another. */
 static ovoid_status choose_fars(const job *j, size_t c, ov_survey_far *const *far, size_t count,
                                 search *made) {
+    ovoid_status status = OVOID_OK;
     *made = (search){.cell = c};
     for (size_t k = 0; k < count; ++k)
-        made->count += may_be_near(j, c, far[k]);
-    if (made->count == 0)
-        return OVOID_OK;
-    made->far = ov_alloc(j->context, made->count, sizeof(void *), "points that are far");
-    made->found = ov_alloc(j->context, made->count, sizeof *made->found, "points that are far");
-    if (!made->far || !made->found)
-        return OVOID_ERROR_MEMORY;
-    made->count = 0;
-    for (size_t k = 0; k < count; ++k)
-        if (may_be_near(j, c, far[k])) {
-            made->found[made->count] = *far[k];
-            made->far[made->count++] = far[k];
+        for (size_t g = 0; g < j->images.count; ++g) {
+            double at[3];
+            if (may_be_near(j, c, g, far[k], at))
+                OV_TRY(add_search(j, far[k], at, made));
         }
-    return OVOID_OK;
+cleanup:
+    return status;
 }
 
 static ovoid_status search_one(ovoid_context *context, size_t hand, size_t n, void *user) {
@@ -280,11 +334,11 @@ static ovoid_status search_one(ovoid_context *context, size_t hand, size_t n, vo
     desk *const d = &j->desk[hand];
     ovoid_status status = OVOID_OK;
     const search *const s = &j->search[n];
-    const ov_box *const box = box_of(j, s->cell);
+    const ov_box box = box_of(j, s->cell);
     const double began = ov_seconds();
     ov_survey_terms terms;
     OV_TRY(take_terms(j, context, d, s->cell, &terms));
-    OV_TRY(ov_survey_seek(context, &d->options, &terms, box->low, box->high, &j->standing,
+    OV_TRY(ov_survey_seek(context, &d->options, &terms, box.low, box.high, &j->standing,
                           &j->cell[s->cell], j->kept[s->cell], s->found, s->count));
 cleanup:
     d->busy += ov_seconds() - began;
@@ -447,20 +501,17 @@ static double meshing_share(const job *j) {
     return busy > 0.0 ? meshing / busy : 0.0;
 }
 
-/* There are no images of it all. */
-static const ov_survey_images alone = {.count = 1};
-
 static ovoid_status find_distances(job *j, ovoid_measures *made) {
     ovoid_status status = OVOID_OK;
     ov_survey_total total = {0};
-    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total));
+    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &j->images, 0.0, &total));
     OV_TRY(check_outer(j, &total));
     ov_survey_total_destroy(&total);
-    OV_TRY(ov_survey_stand(j->context, j->cell, j->cells, &j->standing));
+    OV_TRY(ov_survey_stand(j->context, j->cell, j->cells, &j->images, &j->standing));
     OV_TRY(correct_all(j));
     OV_TRY(settle(j, 0, j->cells));
     OV_TRY(settle_late(j));
-    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total));
+    OV_TRY(ov_survey_join(j->context, j->cell, j->cells, &j->images, 0.0, &total));
     OV_TRY(distances_of(j, total.sums, &made->distances));
     OV_TRY(distances_of(j, total.sums_outer, &made->distances_outer));
     made->deviation = total.deviation;
@@ -471,11 +522,13 @@ cleanup:
 
 static ovoid_status find_contents(job *j, ovoid_measures *made) {
     ov_survey_total total = {0};
-    const ovoid_status status = ov_survey_join(j->context, j->cell, j->cells, &alone, 0.0, &total);
-    made->area = ov_pair_of(total.area[0], total.area[1]);
-    made->volume = ov_pair_of(total.volume[0], total.volume[1]);
-    made->area_outer = ov_pair_of(total.area_outer[0], total.area_outer[1]);
-    made->volume_outer = ov_pair_of(total.volume_outer[0], total.volume_outer[1]);
+    const ovoid_status status =
+        ov_survey_join(j->context, j->cell, j->cells, &j->images, 0.0, &total);
+    const double units = (double)j->images.count;
+    made->area = ov_pair_of(units * total.area[0], units * total.area[1]);
+    made->volume = ov_pair_of(units * total.volume[0], units * total.volume[1]);
+    made->area_outer = ov_pair_of(units * total.area_outer[0], units * total.area_outer[1]);
+    made->volume_outer = ov_pair_of(units * total.volume_outer[0], units * total.volume_outer[1]);
     made->components_original = total.components[0];
     made->components_sparse = total.components[1];
     made->outer_original = total.outer[0];
@@ -493,6 +546,7 @@ ovoid_status ov_measure_cells(ovoid_context *context, const ovoid_field *origina
     const double began = ov_seconds();
     ovoid_measures made;
     job j = {.context = context,
+             .images = {.count = 1}, /* there are none, but for all of it */
              .fars_most = how->fars_most > 0 ? how->fars_most : FARS_MOST,
              .kept_most = how->kept_most > 0 ? how->kept_most : KEPT_MOST,
              .options = {.isovalue = o->isovalue,
@@ -504,7 +558,9 @@ ovoid_status ov_measure_cells(ovoid_context *context, const ovoid_field *origina
                          .contents = !how->distances}};
     ovoid_measures_init(&made, sizeof made);
     ov_progress_stage(context, "measure");
-    OV_TRY(prepare(&j, fields, how->most));
+    OV_TRY(prepare(&j, fields, how));
+    if (how->repeat && (*how->scattered = j.ends.scattered))
+        goto cleanup;
     OV_TRY(lay_desks(&j, how->hands));
     OV_TRY(survey_all(&j));
     OV_TRY(check_surfaces(&j, empty));

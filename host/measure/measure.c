@@ -165,17 +165,35 @@ static size_t cell_terms(const ovoid_measure_options *o, const ovoid_field *orig
     return most > OVOID_DEFAULT_MEASURE_ATOMS ? OVOID_DEFAULT_CELL_ATOMS : 0;
 }
 
+/* Cell by cell; of all of both fields or, repeat given, of their units. */
 static ovoid_status measure_cells(ovoid_context *context, ovoid_field *original,
                                   ovoid_field *sparse, const ovoid_mesh_options *meshing,
-                                  const ovoid_measure_options *o, ovoid_measures *made) {
+                                  const ov_cells_options *how, ovoid_measures *made) {
     const ovoid_field *empty = NULL;
-    const ov_cells_options how = {.most = cell_terms(o, original, sparse),
-                                  .distances = o->distances};
+    const ovoid_field *const first = how->repeat ? original->repeat.unit : original,
+                             *const second = how->repeat ? sparse->repeat.unit : sparse;
     const ovoid_status status =
-        ov_measure_cells(context, original, sparse, meshing, &how, &empty, made);
-    return !empty ? status
-                  : name_failure(context, status, empty, empty == original ? sparse : original,
-                                 empty == original ? "first " : "second ");
+        ov_measure_cells(context, first, second, meshing, how, &empty, made);
+    if (!empty)
+        return status;
+    return name_failure(context, status, empty, empty == first ? second : first,
+                        empty == first ? "first " : "second ");
+}
+
+/* Two fields that repeat their units by the same motions are measured by these, if that goes. */
+static ovoid_status measure_large(ovoid_context *context, ovoid_field *original,
+                                  ovoid_field *sparse, const ovoid_mesh_options *meshing,
+                                  const ovoid_measure_options *o, ovoid_measures *made) {
+    bool scattered = false;
+    ov_cells_options how = {.most = cell_terms(o, original, sparse),
+                            .distances = o->distances,
+                            .repeat = ov_fields_repeat(original, sparse),
+                            .scattered = &scattered};
+    const ovoid_status status = measure_cells(context, original, sparse, meshing, &how, made);
+    if (status != OVOID_OK || !scattered)
+        return status;
+    how.repeat = NULL;
+    return measure_cells(context, original, sparse, meshing, &how, made);
 }
 
 ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original, ovoid_field *sparse,
@@ -198,7 +216,7 @@ ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original, ovoid_
     const ovoid_mesh_options wanted = {sizeof wanted, o.isovalue, o.spacing, o.vertices};
     OV_TRY(ov_mesh_options_take(context, &wanted, original, &meshing));
     if (cell_terms(&o, original, sparse) > 0)
-        OV_TRY(measure_cells(context, original, sparse, &meshing, &o, &made));
+        OV_TRY(measure_large(context, original, sparse, &meshing, &o, &made));
     else
         OV_TRY(measure_whole(context, original, sparse, &meshing, o.distances, &made));
     ov_sized_give(measures, &made, sizeof made);

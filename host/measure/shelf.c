@@ -74,10 +74,28 @@ cleanup:
     return status;
 }
 
-static bool reaches(const ov_shelf *shelf, const ov_body *body, const ov_box *box) {
+/* ---- taking --------------------------------------------------------------------------------- */
+
+void ov_taken_destroy(ov_taken *taken) {
+    free(taken->body);
+    free(taken->image);
+    *taken = (ov_taken){0};
+}
+
+/* Whether what is in a box where the field is may be felt in another one where an image is. */
+static bool meets(const ov_box *own, const ov_rigid *motion, const ov_box *box) {
+    if (!motion)
+        return ov_boxes_near(own, box, 0.0);
+    const ov_box moved = ov_box_move(own, motion);
+    return ov_boxes_near(&moved, box, 0.0);
+}
+
+static bool reaches(const ov_shelf *shelf, size_t term, const ov_rigid *motion, const ov_box *box) {
+    ov_body body;
     ov_box own = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    widen(body, shelf->least, &own);
-    return ov_boxes_near(&own, box, 0.0);
+    ov_body_of_field(shelf->field, term, &body);
+    widen(&body, shelf->least, &own);
+    return own.low[0] <= own.high[0] && meets(&own, motion, box);
 }
 
 static int by_number(const void *a, const void *b) {
@@ -85,41 +103,60 @@ static int by_number(const void *a, const void *b) {
     return (p > q) - (p < q);
 }
 
-/* Numbers of the terms that count in the box. */
-static ovoid_status list(ovoid_context *context, const ov_shelf *shelf, const ov_box *box,
-                         uint32_t **listed, size_t *count) {
-    size_t capacity = 0;
+/* Numbers of the terms that count in the box where the motion takes them; NULL: where they are. */
+static ovoid_status list(ovoid_context *context, const ov_shelf *shelf, const ov_rigid *motion,
+                         const ov_box *box, uint32_t **listed, size_t *count, size_t *capacity) {
     const ov_partition *const cut = &shelf->cut;
+    *count = 0;
     for (size_t p = 0; p < cut->count; ++p) {
-        if (!ov_boxes_near(&shelf->reach[p], box, 0.0))
+        if (shelf->reach[p].low[0] > shelf->reach[p].high[0] ||
+            !meets(&shelf->reach[p], motion, box))
             continue;
         for (size_t n = cut->part[p].first; n < cut->part[p].first + cut->part[p].count; ++n) {
-            ov_body body;
-            ov_body_of_field(shelf->field, cut->order[n], &body);
-            if (!reaches(shelf, &body, box))
+            if (!reaches(shelf, cut->order[n], motion, box))
                 continue;
-            const ovoid_status status = ov_grow(context, listed, &capacity, *count + 1,
+            const ovoid_status status = ov_grow(context, listed, capacity, *count + 1,
                                                 sizeof **listed, "a surface's terms");
             if (status != OVOID_OK)
                 return status;
             (*listed)[(*count)++] = cut->order[n];
         }
     }
+    if (*count > 0) /* so that sums are those of the whole */
+        qsort(*listed, *count, sizeof **listed, by_number);
     return OVOID_OK;
 }
 
-/* In the order of their numbers, so that sums are those of the whole. */
-ovoid_status ov_shelf_take(ovoid_context *context, const ov_shelf *shelf, const ov_box *box,
-                           ov_body **bodies, size_t *count, size_t *capacity) {
+static ovoid_status add(ovoid_context *context, const ov_shelf *shelf, const ov_rigid *motion,
+                        size_t image, const uint32_t *listed, size_t count, ov_taken *taken) {
+    ovoid_status status = OVOID_OK;
+    const size_t needed = taken->count + count + 1;
+    OV_TRY(ov_grow(context, &taken->body, &taken->body_capacity, needed, sizeof *taken->body,
+                   "a surface's terms"));
+    OV_TRY(ov_grow(context, &taken->image, &taken->image_capacity, needed, sizeof *taken->image,
+                   "a surface's terms"));
+    for (size_t i = 0; i < count; ++i, ++taken->count) {
+        taken->image[taken->count] = (uint32_t)image;
+        if (motion)
+            ov_body_of_image(shelf->field, listed[i], motion, &taken->body[taken->count]);
+        else
+            ov_body_of_field(shelf->field, listed[i], &taken->body[taken->count]);
+    }
+cleanup:
+    return status;
+}
+
+ovoid_status ov_shelf_take(ovoid_context *context, const ov_shelf *shelf,
+                           const ov_survey_images *images, const ov_box *box, ov_taken *taken) {
     ovoid_status status = OVOID_OK;
     uint32_t *listed = NULL;
-    *count = 0;
-    OV_TRY(list(context, shelf, box, &listed, count));
-    if (*count > 0)
-        qsort(listed, *count, sizeof *listed, by_number);
-    OV_TRY(ov_grow(context, bodies, capacity, *count + 1, sizeof **bodies, "a surface's terms"));
-    for (size_t i = 0; i < *count; ++i)
-        ov_body_of_field(shelf->field, listed[i], &(*bodies)[i]);
+    size_t count, capacity = 0;
+    taken->count = 0;
+    for (size_t g = 0; g < images->count; ++g) {
+        const ov_rigid *const motion = g > 0 ? &images->image[g] : NULL;
+        OV_TRY(list(context, shelf, motion, box, &listed, &count, &capacity));
+        OV_TRY(add(context, shelf, motion, g, listed, count, taken));
+    }
 cleanup:
     free(listed);
     return status;

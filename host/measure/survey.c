@@ -141,8 +141,9 @@ static ovoid_status tell_images_apart(ov_surveyor *s) {
         return OVOID_OK;
     OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
                       s->original_count, LARGEST_WITHIN, &s->largest));
-    OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
-                      s->original_count, NEAREST_WITHIN, &s->nearest));
+    OV_TRY(
+        ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original, s->original_count,
+                   s->options->nearest > 0.0 ? s->options->nearest : NEAREST_WITHIN, &s->nearest));
 cleanup:
     return status;
 }
@@ -329,7 +330,7 @@ static ovoid_status add_ports(const ov_surveyor *s, const ov_sheet *from, ov_sur
             any = any || from->piece_of[corner[i]] != OV_NO_PIECE;
         if (from->zone[t] == OV_ZONE_CELL || !any)
             continue;
-        ov_mesh_centre(mesh, t, centre);
+        find_place(s, mesh, t, centre);
         const uint32_t image = image_at(s, centre);
         for (size_t i = 0; i < 3 && image > 0 && image != NO_IMAGE; ++i) {
             const uint32_t v = corner[i], piece = from->piece_of[v];

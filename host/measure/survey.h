@@ -108,6 +108,8 @@ typedef struct ov_survey_options {
      * belongs to the image of the original's largest term there, and what belongs to others than
      * the unit itself is left to their own survey. NULL: all is surveyed. */
     const uint32_t *image;
+    double nearest; /* angstrom: what is further from all these terms belongs to none; 0: a default
+                     */
 } ov_survey_options;
 
 /* Beyond the halo, in steps of the lattice. */
@@ -140,6 +142,15 @@ ovoid_status ov_survey_bodies(ovoid_context *context, const ov_survey_options *o
 
 /* ---- when all cells are known ---------------------------------------------------------------- */
 
+/* Where a survey is of the unit of a symmetric assembly: the images that its cells speak of, first
+ * the unit itself, and the spacing of its meshes. */
+typedef struct ov_survey_images {
+    const ov_rigid *image;
+    size_t count; /* 1: there is the unit alone */
+    double spacing;
+    const double *centre; /* where the axes meet */
+} ov_survey_images;
+
 /* Which pieces belong to outer surfaces. {0} is empty. */
 typedef struct ov_survey_standing {
     size_t *first[OV_SURVEY_SIDES];        /* piece of each cell among those of all */
@@ -149,7 +160,7 @@ typedef struct ov_survey_standing {
 } ov_survey_standing;
 
 ovoid_status ov_survey_stand(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                             ov_survey_standing *standing);
+                             const ov_survey_images *images, ov_survey_standing *standing);
 void ov_survey_standing_destroy(ov_survey_standing *standing);
 
 /* For the vertex with this key: 1 on an outer surface, -1 on the wall of a cavity, 0 not known. */
@@ -190,17 +201,8 @@ typedef struct ov_survey_total {
     size_t spots;
 } ov_survey_total;
 
-/* Where a survey is of the unit of a symmetric assembly: the images that its cells speak of, first
- * the unit itself, and the spacing of its meshes. */
-typedef struct ov_survey_images {
-    const ov_rigid *image;
-    size_t count; /* 1: there is the unit alone */
-    double spacing;
-    const double *centre; /* where the axes meet */
-} ov_survey_images;
-
 /* Joins all cells: of a unit, too, what hangs together with images of it. Contents are then those
- * of the unit, and so are pieces: of what the images repeat one is counted. Spots are no nearer to
+ * of the unit, and pieces those of the whole that its images make. Spots are no nearer to
  * each other than `apart`. */
 ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells, size_t count,
                             const ov_survey_images *images, double apart, ov_survey_total *total);

@@ -13,6 +13,11 @@
 #define PORT 2.0
 #define PORT_COSINE 0.7
 
+/* What is in the unit as `from` goes on in an image of it, as what is `to` in the unit. */
+typedef struct link {
+    uint32_t from, to, image;
+} link;
+
 /* The pieces of one side, those of all cells one after the other. */
 typedef struct joint {
     size_t pieces, seams, ports, necks;
@@ -24,6 +29,9 @@ typedef struct joint {
     double *at;      /* counted from a vertex of it */
     ov_survey_seam *seam, *neck;
     ov_survey_port *port;
+    link *link; /* between what hangs together in the unit */
+    size_t links, link_capacity;
+    uint64_t *copies; /* of each `whole`: how many of it the images make; NULL: one */
 } joint;
 
 static void joint_destroy(joint *j) {
@@ -36,6 +44,8 @@ static void joint_destroy(joint *j) {
     free(j->at);
     free(j->seam);
     free(j->port);
+    free(j->link);
+    free(j->copies);
 }
 
 static int by_key(const void *a, const void *b) {
@@ -138,8 +148,8 @@ static const ov_survey_port *find_port(const joint *j, const ov_grid *grid,
     return nearest;
 }
 
-/* Pieces that go on in an image of the unit hang together with what the unit has there. */
-static ovoid_status join_images(ovoid_context *context, const ov_survey_images *images, joint *j) {
+/* Where pieces go on in an image of the unit. */
+static ovoid_status find_links(ovoid_context *context, const ov_survey_images *images, joint *j) {
     ovoid_status status = OVOID_OK;
     ov_grid grid = {0};
     ov_rigid *const back = ov_alloc(context, images->count, sizeof *back, "seams between units");
@@ -153,8 +163,11 @@ static ovoid_status join_images(ovoid_context *context, const ov_survey_images *
     for (size_t k = 0; k < j->ports; ++k) {
         const ov_survey_port *const port = &j->port[k];
         const ov_survey_port *const other = find_port(j, &grid, port, &back[port->image]);
-        if (other)
-            ov_unite(j->whole, port->piece, other->piece);
+        if (!other)
+            continue;
+        OV_TRY(ov_grow(context, &j->link, &j->link_capacity, j->links + 1, sizeof *j->link,
+                       "seams between units"));
+        j->link[j->links++] = (link){.from = port->piece, .to = other->piece, .image = port->image};
     }
 cleanup:
     ov_grid_destroy(&grid);
@@ -162,9 +175,136 @@ cleanup:
     return status;
 }
 
-/* centre: where volumes count from that images of the unit go on with; NULL: there are none. */
-static void add_volumes(const ov_survey_cell *cells, size_t count, size_t n, const double *centre,
-                        joint *j) {
+static int by_ends(const void *a, const void *b) {
+    const link *const p = a, *const q = b;
+    if (p->image != q->image)
+        return p->image < q->image ? -1 : 1;
+    if (p->from != q->from)
+        return p->from < q->from ? -1 : 1;
+    return (p->to > q->to) - (p->to < q->to);
+}
+
+/* Of pieces those that stand for what hangs together in the unit, and each link once. */
+static void tidy_links(joint *j) {
+    size_t kept = 0;
+    for (size_t k = 0; k < j->links; ++k) {
+        j->link[k].from = ov_union_first(j->whole, j->link[k].from);
+        j->link[k].to = ov_union_first(j->whole, j->link[k].to);
+    }
+    if (j->links > 0)
+        qsort(j->link, j->links, sizeof *j->link, by_ends);
+    for (size_t k = 0; k < j->links; ++k)
+        if (k == 0 || by_ends(&j->link[k], &j->link[kept - 1]) != 0)
+            j->link[kept++] = j->link[k];
+    j->links = kept;
+}
+
+/* The pieces with links in all images: which hang together in the whole. */
+typedef struct spread {
+    size_t images, linked;
+    uint32_t *number; /* of each piece among those with links */
+    uint32_t *piece;  /* of each number */
+    uint32_t *of;     /* number * images + image leads to the first that it hangs together with */
+} spread;
+
+static void spread_destroy(spread *s) {
+    free(s->number);
+    free(s->piece);
+    free(s->of);
+}
+
+static void number_piece(uint32_t piece, spread *s) {
+    if (s->number[piece] != UINT32_MAX)
+        return;
+    s->number[piece] = (uint32_t)s->linked;
+    s->piece[s->linked++] = piece;
+}
+
+static ovoid_status spread_create(ovoid_context *context, const joint *j, size_t images,
+                                  spread *s) {
+    s->images = images;
+    s->number = ov_alloc(context, j->pieces, sizeof *s->number, "pieces of a surface");
+    s->piece = ov_alloc(context, 2 * j->links, sizeof *s->piece, "pieces of a surface");
+    if (!s->number || !s->piece)
+        return OVOID_ERROR_MEMORY;
+    for (size_t p = 0; p < j->pieces; ++p)
+        s->number[p] = UINT32_MAX;
+    for (size_t k = 0; k < j->links; ++k) {
+        number_piece(j->link[k].from, s);
+        number_piece(j->link[k].to, s);
+    }
+    if (s->linked > UINT32_MAX / images)
+        return ov_fail(context, OVOID_ERROR_LIMIT, "%zu pieces of a surface in %zu units",
+                       s->linked, images);
+    s->of = ov_alloc(context, s->linked * images, sizeof *s->of, "pieces of a surface");
+    if (!s->of)
+        return OVOID_ERROR_MEMORY;
+    for (size_t n = 0; n < s->linked * images; ++n)
+        s->of[n] = (uint32_t)n;
+    return OVOID_OK;
+}
+
+/* Joins what is linked, in all images. */
+static void join_everywhere(const joint *j, const ov_survey_images *images, spread *s) {
+    for (size_t g = 0; g < images->count; ++g) {
+        size_t there = 0;
+        for (size_t k = 0; k < j->links; ++k) {
+            const link *const l = &j->link[k];
+            if (k == 0 || l->image != l[-1].image) { /* the image of an image */
+                const ov_rigid both = ov_rigid_after(&images->image[l->image], &images->image[g]);
+                there = ov_rigid_find(images->image, images->count, &both);
+            }
+            ov_unite(s->of, (uint32_t)(s->number[l->from] * s->images + g),
+                     (uint32_t)(s->number[l->to] * s->images + there));
+        }
+    }
+}
+
+/* As many of each piece as there are images; where it goes on in some of these, fewer: each in the
+ * whole counts for the piece that it begins with. */
+static ovoid_status count_copies(ovoid_context *context, const ov_survey_images *images, joint *j) {
+    ovoid_status status = OVOID_OK;
+    spread s = {0};
+    j->copies = ov_alloc(context, j->pieces, sizeof *j->copies, "pieces of a surface");
+    if (!j->copies)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(spread_create(context, j, images->count, &s));
+    join_everywhere(j, images, &s);
+    for (size_t p = 0; p < j->pieces; ++p)
+        j->copies[p] = s.number[p] == UINT32_MAX ? images->count : 0;
+    for (size_t n = 0; n < s.linked * s.images; ++n)
+        j->copies[s.piece[n / s.images]] += s.of[n] == n;
+cleanup:
+    spread_destroy(&s);
+    return status;
+}
+
+/* Pieces that go on in an image of the unit hang together with what the unit has there. */
+static ovoid_status join_images(ovoid_context *context, const ov_survey_images *images, joint *j) {
+    ovoid_status status = OVOID_OK;
+    if (images->count == 1)
+        return OVOID_OK;
+    OV_TRY(find_links(context, images, j));
+    tidy_links(j);
+    OV_TRY(count_copies(context, images, j));
+    for (size_t k = 0; k < j->links; ++k)
+        ov_unite(j->whole, j->link[k].from, j->link[k].to);
+    for (size_t k = 0; k < 2 * j->links; ++k) {
+        const uint32_t p = k % 2 == 0 ? j->link[k / 2].from : j->link[k / 2].to;
+        const uint32_t first = ov_union_first(j->whole, p);
+        if (first == p)
+            continue;
+        j->copies[first] += j->copies[p];
+        j->copies[p] = 0;
+    }
+cleanup:
+    return status;
+}
+
+/* Volumes that images of the unit go on with count from where the axes meet. */
+static void add_volumes(const ov_survey_cell *cells, size_t count, size_t n,
+                        const ov_survey_images *images, joint *j) {
+    const double *const centre = images->count > 1 ? images->centre : NULL;
     for (size_t c = 0; c < count; ++c)
         for (size_t k = 0; k < cells[c].side[n].pieces; ++k) {
             const uint32_t whole = ov_union_first(j->whole, (uint32_t)(j->first[c] + k));
@@ -205,9 +345,10 @@ static void add_side(const ov_survey_cell *cells, size_t count, size_t n, joint 
             const ov_survey_piece *const piece = &cells[c].side[n].piece[k];
             const size_t at = j->first[c] + k;
             const bool outer = is_outer(j, at), first = j->whole[at] == at;
+            const uint64_t copies = !first ? 0 : j->copies ? j->copies[at] : 1;
             total->area[n] += piece->area;
             total->volume[n] += first ? j->volume[at] : 0.0;
-            total->components[n] += first;
+            total->components[n] += copies;
             total->hausdorff = fmax(total->hausdorff, piece->furthest);
             add_sums(&piece->whole, &total->sums[n]);
             if (is_exposed(j, at))
@@ -216,7 +357,7 @@ static void add_side(const ov_survey_cell *cells, size_t count, size_t n, joint 
                 continue;
             total->area_outer[n] += piece->area;
             total->volume_outer[n] += first ? j->volume[at] : 0.0;
-            total->outer[n] += first;
+            total->outer[n] += copies;
             add_sums(&piece->outer, &total->sums_outer[n]);
         }
 }
@@ -248,10 +389,10 @@ ovoid_status ov_survey_join(ovoid_context *context, const ov_survey_cell *cells,
         status = joint_create(context, cells, count, n, &j);
         if (status == OVOID_OK) {
             join(cells, count, n, &j);
-            status = images->count > 1 ? join_images(context, images, &j) : OVOID_OK;
+            status = join_images(context, images, &j);
         }
         if (status == OVOID_OK) {
-            add_volumes(cells, count, n, images->count > 1 ? images->centre : NULL, &j);
+            add_volumes(cells, count, n, images, &j);
             expose(&j);
             add_side(cells, count, n, &j, &made);
             status = add_spots(context, cells, count, n, &j, &capacity, &made);
@@ -298,7 +439,7 @@ static ovoid_status stand_side(ovoid_context *context, const ov_survey_cell *cel
 }
 
 ovoid_status ov_survey_stand(ovoid_context *context, const ov_survey_cell *cells, size_t count,
-                             ov_survey_standing *standing) {
+                             const ov_survey_images *images, ov_survey_standing *standing) {
     ovoid_status status = OVOID_OK;
     ov_survey_standing made = {0};
     for (size_t n = 0; n < OV_SURVEY_SIDES && status == OVOID_OK; ++n) {
@@ -306,7 +447,10 @@ ovoid_status ov_survey_stand(ovoid_context *context, const ov_survey_cell *cells
         status = joint_create(context, cells, count, n, &j);
         if (status == OVOID_OK) {
             join(cells, count, n, &j);
-            add_volumes(cells, count, n, NULL, &j);
+            status = join_images(context, images, &j);
+        }
+        if (status == OVOID_OK) {
+            add_volumes(cells, count, n, images, &j);
             status = stand_side(context, cells, count, n, &j, &made);
         }
         joint_destroy(&j);

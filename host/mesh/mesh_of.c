@@ -5,9 +5,11 @@
 #include "base/sized.h"
 #include "field/field.h"
 #include "mesh/march.h"
+#include "model/ellipsoid.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* phi is kept in floats, with room above and below for the cut-off. */
 #define ISOVALUE_MIN 1e-25
@@ -46,8 +48,11 @@ ovoid_status ov_field_check_ellipsoids(ovoid_context *context, const ovoid_field
     ov_terms terms = {0};
     if (!field->model)
         return OVOID_OK;
-    const ovoid_status status = ov_terms_set(context, &terms, field->quadrics, field->count,
-                                             field->quadrics[0].centre, OV_MARCH_CUTOFF * isovalue);
+    ovoid_status status = ov_field_place(context, field);
+    if (status != OVOID_OK)
+        return status;
+    status = ov_terms_set(context, &terms, field->quadrics, field->count, field->quadrics[0].centre,
+                          OV_MARCH_CUTOFF * isovalue);
     ov_terms_destroy(&terms);
     return status;
 }
@@ -57,6 +62,19 @@ void ov_body_of_field(const ovoid_field *field, size_t i, ov_body *body) {
         ov_body_of_ellipsoid(&field->model->unit[i], body);
     else
         ov_body_of_ball(&field->quadrics[i], field->decay, body);
+}
+
+void ov_body_of_image(const ovoid_field *field, size_t i, const ov_rigid *motion, ov_body *body) {
+    if (field->model) {
+        ovoid_ellipsoid moved;
+        ov_ellipsoid_move(&field->model->unit[i], motion, &moved);
+        ov_body_of_ellipsoid(&moved, body);
+        return;
+    }
+    double centre[3];
+    ov_body_of_ball(&field->quadrics[i], field->decay, body);
+    ov_rigid_move(motion, body->quadric.centre, centre);
+    memcpy(body->quadric.centre, centre, sizeof centre);
 }
 
 static ov_body *bodies_of(ovoid_context *context, const ovoid_field *field) {
@@ -78,6 +96,7 @@ ovoid_status ovoid_field_mesh(ovoid_context *context, ovoid_field *field,
     ov_progress_begin(context, "mesh");
     OV_TRY(ov_field_check(context, field));
     OV_TRY(ov_mesh_options_take(context, options, field, &o));
+    OV_TRY(ov_field_place(context, field));
     if (!(bodies = bodies_of(context, field)))
         OV_TRY(OVOID_ERROR_MEMORY);
     OV_TRY(ov_field_check_ellipsoids(context, field, o.isovalue));

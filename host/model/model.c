@@ -196,14 +196,36 @@ ovoid_status ov_model_add_note(ovoid_context *context, ovoid_model *model, const
     return OVOID_OK;
 }
 
+static ovoid_status copy_notes(ovoid_context *context, const ovoid_model *model,
+                               ovoid_model *copy) {
+    ovoid_status status = OVOID_OK;
+    for (size_t i = 0; i < model->note_count; i++)
+        OV_TRY(ov_model_add_note(context, copy, model->notes[i], strlen(model->notes[i])));
+cleanup:
+    return status;
+}
+
 ovoid_status ov_model_copy(ovoid_context *context, const ovoid_model *model, ovoid_model **copy) {
     ovoid_status status = OVOID_OK;
     ovoid_model *made = NULL;
     OV_TRY(ov_model_place(context, model));
     OV_TRY(ovoid_model_create(context, ovoid_model_ellipsoids(model), ovoid_model_size(model),
                               model->decay, model->isovalue, &made));
-    for (size_t i = 0; i < model->note_count; i++)
-        OV_TRY(ov_model_add_note(context, made, model->notes[i], strlen(model->notes[i])));
+    OV_TRY(copy_notes(context, model, made));
+    *copy = made;
+    made = NULL;
+cleanup:
+    ovoid_model_destroy(&made);
+    return status;
+}
+
+ovoid_status ov_model_copy_placed(ovoid_context *context, const ovoid_model *model,
+                                  ovoid_model **copy) {
+    ovoid_status status = OVOID_OK;
+    ovoid_model *made = NULL;
+    OV_TRY(create(context, model->unit, model->unit_count, model->placements,
+                  model->placement_count, model->decay, model->isovalue, &made));
+    OV_TRY(copy_notes(context, model, made));
     *copy = made;
     made = NULL;
 cleanup:

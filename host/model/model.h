@@ -62,6 +62,10 @@ void ov_model_take_owner(ovoid_model *model, uint32_t **owner, size_t atoms);
 /* All ellipsoids, without placements, surface and notes; owners stay behind. */
 ovoid_status ov_model_copy(ovoid_context *context, const ovoid_model *model, ovoid_model **copy);
 
+/* The same with the placements, as a unit. */
+ovoid_status ov_model_copy_placed(ovoid_context *context, const ovoid_model *model,
+                                  ovoid_model **copy);
+
 /* Adds the finished note text "key: value" (copied, `length` bytes). */
 ovoid_status ov_model_add_note(ovoid_context *context, ovoid_model *model, const char *text,
                                size_t length);

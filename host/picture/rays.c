@@ -8,14 +8,18 @@
 
 _Static_assert(OV_BLOCK_X *OV_BLOCK_Y == OV_PACK, "a block is a pack");
 
-#define TILE 32                        /* rays on a side of the smallest tile */
-#define BOXES_MOST ((uint64_t)1 << 20) /* before tiles grow */
+#define TILE 32                        /* rays on a side of the smallest tile, */
+#define TILE_LEAST 8                   /* or fewer, where they are so far apart that */
+#define TILE_SIDE 24.0                 /* it is larger than this, angstrom */
+#define BOXES_MOST ((uint64_t)1 << 20) /* before tiles grow; */
+#define BOXES_FAR ((uint64_t)1 << 22)  /* where rays are far apart */
 #define SLABS_MOST ((uint64_t)1 << 21) /* altogether */
 #define VISITS_MOST 1e11               /* of slabs by packs of rays: a minute on two cores */
 #define CURVE_BITS 21                  /* tiles and slabs are fewer than 2^21 each way */
 #define STEP_LEAST 0.05                /* angstrom */
 #define STEP_MOST 0.4                  /* angstrom */
-#define STEP_PER_WIDTH 0.45            /* of the narrowest term along the rays */
+#define STEP_PER_WIDTH 0.45            /* of the narrowest term along the rays, */
+#define STEP_PER_RAY 0.125             /* but of the rays' distance at least */
 #define PACKS_MOST ((uint64_t)UINT32_MAX / OV_PACK)
 
 size_t ov_rays_blocks(const ov_rays *rays) {
@@ -51,17 +55,21 @@ static bool measure_depth(const ov_quadric *quadrics, size_t count, double cutof
         *high = fmax(*high, one.high[2]);
         sharpest = fmax(sharpest, quadrics[i].a[5]);
     }
-    *step = fmax(STEP_LEAST, fmin(STEP_MOST, STEP_PER_WIDTH / sqrt(2.0 * sharpest)));
+    const double finest = fmin(fmax(STEP_LEAST, STEP_PER_RAY * rays->spacing), STEP_MOST);
+    *step = fmax(finest, fmin(STEP_MOST, STEP_PER_WIDTH / sqrt(2.0 * sharpest)));
     return *low <= *high;
 }
 
 /* Tiles grow until the boxes are few enough; one tile for all in the worst case. */
 static void plan_tiles(const ov_rays *rays, ov_boxes *boxes) {
-    for (boxes->tile = TILE;; boxes->tile *= 2) {
+    uint32_t least = TILE;
+    while (least > TILE_LEAST && least * rays->spacing > TILE_SIDE)
+        least /= 2;
+    for (boxes->tile = least;; boxes->tile *= 2) {
         boxes->tiles_x = (rays->columns + boxes->tile - 1) / boxes->tile;
         boxes->tiles_y = (rays->rows + boxes->tile - 1) / boxes->tile;
         const uint64_t tiles = (uint64_t)boxes->tiles_x * boxes->tiles_y;
-        if (tiles == 1 || tiles * boxes->slabs <= BOXES_MOST)
+        if (tiles == 1 || tiles * boxes->slabs <= (least < TILE ? BOXES_FAR : BOXES_MOST))
             return;
     }
 }

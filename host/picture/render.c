@@ -142,7 +142,9 @@ static ovoid_status check(ovoid_context *context, const ovoid_field *original,
 static ovoid_status make_scene(ovoid_context *context, const ovoid_field *field, scene *s) {
     if (!field)
         return OVOID_OK;
-    const ovoid_status status = ov_field_check(context, field);
+    ovoid_status status = ov_field_check(context, field);
+    if (status == OVOID_OK)
+        status = ov_field_place(context, field);
     if (status != OVOID_OK)
         return status;
     s->quadrics = field->quadrics;

@@ -226,6 +226,9 @@ static ovoid_status write_ellipsoids(ovoid_context *context, const char *path, c
 static ovoid_status export_field(ovoid_context *context, ovoid_field *field, const char *path,
                                  const format *chosen, const ovoid_export_options *o) {
     const double isovalue = o->isovalue > 0.0 ? o->isovalue : field->isovalue;
+    const ovoid_status status = ov_field_place(context, field);
+    if (status != OVOID_OK)
+        return status;
     return chosen->map ? write_map(context, path, chosen, o, isovalue, field)
                        : write_ellipsoids(context, path, chosen, o, isovalue, field->model);
 }

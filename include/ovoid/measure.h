@@ -59,7 +59,10 @@ OVOID_API void ovoid_measure_options_init(ovoid_measure_options *options, size_t
 OVOID_API void ovoid_measures_init(ovoid_measures *measures, size_t size);
 
 /* Meshes both surfaces on the same lattice and compares them; measures was made by
- * ovoid_measures_init(). Large ones are meshed cell by cell, with the same numbers to rounding. */
+ * ovoid_measures_init(). Large ones are meshed cell by cell, with the same numbers to rounding;
+ * where both repeat a unit by the same motions, as a symmetric assembly and a model with its
+ * placements do, that unit is, among its images, and what is said is of all of it: on another
+ * lattice in each unit. */
 OVOID_API ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original,
                                      ovoid_field *sparse, const ovoid_measure_options *options,
                                      ovoid_measures *measures);

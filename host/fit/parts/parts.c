@@ -448,23 +448,13 @@ static void rescue(ovoid_context *context, ov_parts *parts, ov_found *found,
         hand_over(parts, found);
 }
 
-/* Where the axes of all images meet: what no motion of the group moves, the mean of what they make
- * of any place. */
-static void find_centre(const ov_images *images, double centre[3]) {
-    for (size_t k = 0; k < 3; ++k) {
-        centre[k] = 0.0;
-        for (size_t g = 0; g < images->count; ++g) /* of the origin they make their shifts */
-            centre[k] += images->motion[g].shift[k] / (double)images->count;
-    }
-}
-
 ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t atoms,
                             const ov_images *images, const ovoid_fit_options *options, double began,
                             ov_ranks *ranks, ov_found *found, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ovoid_fit_options of_parts = *options; /* the points are as close as in the whole */
     double centre[3];
-    find_centre(images, centre);
+    ov_rigid_centre(images->motion, images->count, centre);
     ov_parts parts = {.xyzr = xyzr,
                       .atoms = atoms,
                       .options = &of_parts,

@@ -408,20 +408,53 @@ cleanup:
     return status;
 }
 
+static int joined_zone(const ov_surveyor *s) {
+    return s->options->halo > 0.0 ? OV_ZONE_HALO : OV_ZONE_BEYOND;
+}
+
+/* Sets whose surface is closed about matter become one, the first of them: they are outer ones
+ * whatever is elsewhere, and there may be many, such as waters. */
+static ovoid_status unite_outer(const ov_surveyor *s, const ov_sheet *from, size_t sets,
+                                uint32_t *set_of) {
+    const ovoid_mesh *const mesh = from->mesh;
+    uint32_t first = OV_NO_SET;
+    double *const volume = ov_alloc(s->context, sets, sizeof *volume, "pieces");
+    if (!volume)
+        return OVOID_ERROR_MEMORY;
+    for (size_t t = 0; t < mesh->triangles; ++t) {
+        const uint32_t *const corner = mesh->corners + 3 * t;
+        ov_content content = {0.0, 0.0};
+        ov_mesh_flat_triangle(mesh, t, s->origin, &content);
+        for (size_t i = 0; i < 3; ++i)
+            if (set_of[corner[i]] != OV_NO_SET)
+                volume[set_of[corner[i]]] +=
+                    from->zone[t] >= joined_zone(s) ? content.volume / 3.0 : -INFINITY;
+    }
+    for (size_t v = 0; v < mesh->vertices; ++v)
+        if (set_of[v] != OV_NO_SET && volume[set_of[v]] > 0.0)
+            set_of[v] = first = first == OV_NO_SET ? set_of[v] : first;
+    free(volume);
+    return OVOID_OK;
+}
+
 /* What hangs together in cell and halo, or in all of a sheet that has no halo, has no neck. */
 static ovoid_status find_necks(ov_surveyor *s, const ov_sheet *from, ov_survey_side *side) {
     const ovoid_mesh *const mesh = from->mesh;
+    ovoid_status status = OVOID_OK;
     necks all = {.surveyor = s, .sheet = from, .side = side};
     size_t sets = 0;
     uint32_t *const set_of = ov_alloc(s->context, mesh->vertices, sizeof *set_of, "pieces");
     if (!set_of)
         return OVOID_ERROR_MEMORY;
-    ov_sheet_unite(from, s->options->halo > 0.0 ? OV_ZONE_HALO : OV_ZONE_BEYOND, set_of);
+    ov_sheet_unite(from, joined_zone(s), set_of);
     for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
         if (set_of[v] != OV_NO_PIECE)
             set_of[v] = set_of[v] == v ? (uint32_t)sets++ : set_of[set_of[v]];
-    const ovoid_status status = ov_mesh_near_sets(s->context, mesh, set_of, sets,
-                                                  OV_NECK * s->options->spacing, add_neck, &all);
+    if (sets > 1)
+        OV_TRY(unite_outer(s, from, sets, set_of));
+    OV_TRY(ov_mesh_near_sets(s->context, mesh, set_of, sets, OV_NECK * s->options->spacing,
+                             add_neck, &all));
+cleanup:
     free(set_of);
     return status;
 }

@@ -197,21 +197,45 @@ static void mark(const joining *j, ovoid_mesh *mesh) {
         mesh->component[c].exposed = mesh->component[ov_union_first(j->of, (uint32_t)c)].exposed;
 }
 
+/* Where vertices belong: all outer components are one set, however many they are, since it does not
+ * matter which of them is near to which. */
+static uint32_t *sets_of_components(ovoid_context *context, const ovoid_mesh *mesh) {
+    uint32_t first = 0;
+    uint32_t *const of = ov_alloc(context, mesh->vertices, sizeof *of, "components of a mesh");
+    while (first < mesh->components && !mesh->component[first].outer)
+        ++first;
+    for (size_t v = 0; of && v < mesh->vertices; ++v)
+        of[v] = mesh->component[mesh->component_of[v]].outer ? first : mesh->component_of[v];
+    return of;
+}
+
+static bool has_cavities(const ovoid_mesh *mesh) {
+    for (size_t c = 0; c < mesh->components; ++c)
+        if (!mesh->component[c].outer)
+            return true;
+    return false;
+}
+
 ovoid_status ov_mesh_expose(ovoid_context *context, ovoid_mesh *mesh) {
+    ovoid_status status = OVOID_OK;
     joining j = {.mesh = mesh};
+    uint32_t *set_of = NULL;
     for (size_t c = 0; c < mesh->components; ++c)
         mesh->component[c].exposed = mesh->component[c].outer;
-    if (mesh->components < 2 || !(mesh->spacing > 0.0))
+    if (mesh->components < 2 || !(mesh->spacing > 0.0) || !has_cavities(mesh))
         return OVOID_OK;
     j.of = ov_alloc(context, mesh->components, sizeof *j.of, "components of a mesh");
-    if (!j.of)
-        return OVOID_ERROR_MEMORY;
+    if (!j.of || !(set_of = sets_of_components(context, mesh))) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
     for (size_t c = 0; c < mesh->components; ++c)
         j.of[c] = (uint32_t)c;
-    const ovoid_status status = ov_mesh_near_sets(
-        context, mesh, mesh->component_of, mesh->components, OV_NECK * mesh->spacing, join, &j);
-    if (status == OVOID_OK)
-        mark(&j, mesh);
+    OV_TRY(ov_mesh_near_sets(context, mesh, set_of, mesh->components, OV_NECK * mesh->spacing, join,
+                             &j));
+    mark(&j, mesh);
+cleanup:
+    free(set_of);
     free(j.of);
     return status;
 }

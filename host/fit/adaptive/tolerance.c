@@ -167,6 +167,34 @@ cleanup:
     return status;
 }
 
+/* Shrinks what holds by the spacing, and confirms what that comes to. A start is confirmed before,
+ * and is what is left where that takes no more ellipsoids: what merges saved by the spacing may
+ * have to be added again by the finer one. */
+static ovoid_status shrink_and_confirm(ov_adaptive *f, double tolerance, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    ov_trial kept = {0};
+    bool keeps = false;
+    if (f->start) {
+        OV_TRY(confirm(f, tolerance, best));
+        keeps = ov_trial_holds(best, tolerance);
+        f->finely = false;
+        OV_TRY(ov_trial_create(f, &kept));
+        ov_trial_copy(best, &kept);
+    }
+    OV_TRY(shrink(f, tolerance, best));
+    if (!keeps || best->count < kept.count) {
+        const size_t before = best->count;
+        OV_TRY(confirm(f, tolerance, best));
+        f->fewest += best->count > before ? best->count - before : 0;
+    }
+    if (keeps && (best->count >= kept.count || !ov_trial_holds(best, tolerance)))
+        ov_trial_swap(&kept, best);
+    f->finely = f->fine.mesh;
+cleanup:
+    ov_trial_destroy(&kept);
+    return status;
+}
+
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     if (f->start)
@@ -181,8 +209,7 @@ ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *b
         OV_TRY(take_atoms(f, best));
     if (ov_trial_holds(best, tolerance)) {
         f->held = best;
-        OV_TRY(shrink(f, tolerance, best));
-        OV_TRY(confirm(f, tolerance, best));
+        OV_TRY(shrink_and_confirm(f, tolerance, best));
     }
     ov_adaptive_quadrics(f, best);
     OV_TRY(ov_owner_tidy(f->context, f->xyzr, f->atoms, f->quadrics, best->count,

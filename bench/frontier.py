@@ -27,6 +27,7 @@ COUNTS = {"1MAG": (25, 36, 50, 70, 87), "FAS2": (35, 50, 70, 100, 142),
           "AChE": (400, 546, 750, 1100, 1636)}
 TOLERANCES = (0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
 POINTS = 30  # for each atom
+EM_MOST = 142  # components: time and memory of expectation maximisation go with the square of the size
 DECAY = 0.5  # angstrom^-2
 COLUMNS = ["molecule", "by", "asked", "ellipsoids", "deviation", "mean_distance", "area_error",
            "volume_error"]
@@ -96,7 +97,8 @@ def rows_of(ovoid, name, path):
     yield from (fit("count", "--ellipsoids", count) for count in COUNTS[name])
     yield from (fit("tolerance", "--tolerance", tolerance) for tolerance in TOLERANCES)
     try:
-        yield from (measure_mixture(ovoid, name, path, count) for count in COUNTS[name])
+        yield from (measure_mixture(ovoid, name, path, count) for count in COUNTS[name]
+                   if count <= EM_MOST)
     except ImportError:
         print("without scikit-learn: no expectation maximisation", file=sys.stderr)
 
@@ -141,8 +143,10 @@ def draw(rows, path):
                            label=text, markersize=5 if by != "paper" else 8, linewidth=1.2)
             panel.set_xscale("log")
             panel.set_yscale("log")
-            for axis in (panel.xaxis, panel.yaxis):
-                plain_log(axis)
+            plain_log(panel.xaxis)
+            plain_log(panel.yaxis)
+            panel.set_xticks(COUNTS[name])
+            panel.set_xticks([], minor=True)
             if column == 0:
                 panel.set_ylabel(label)
         axes[0][column].set_title(name)

@@ -2,7 +2,6 @@
 #include "measure/surveyor.h"
 
 #include "base/progress.h"
-#include "mesh/union.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -59,16 +58,6 @@ typedef struct group {
     int votes;     /* of its vertices that others know: for an outer one */
     uint32_t asked;
 } group;
-
-static void unite_groups(ov_sheet *at) {
-    const ovoid_mesh *const mesh = at->mesh;
-    uint32_t *const of = at->group_of;
-    ov_sheet_unite(at, OV_ZONE_HALO, of);
-    at->groups = 0;
-    for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
-        if (of[v] != OV_NO_PIECE)
-            of[v] = of[v] == v ? (uint32_t)at->groups++ : of[of[v]];
-}
 
 static void look_at_groups(const ov_surveyor *s, const ov_sheet *at, group *groups) {
     const ovoid_mesh *const mesh = at->mesh;
@@ -162,7 +151,7 @@ static ovoid_status find_groups(ov_surveyor *s, size_t n, const ov_survey_standi
     at->group_of = ov_alloc(s->context, at->mesh->vertices, sizeof *at->group_of, "pieces");
     if (!at->group_of)
         return OVOID_ERROR_MEMORY;
-    unite_groups(at);
+    at->groups = ov_sheet_unite(at, OV_ZONE_HALO, at->group_of);
     groups = ov_alloc(s->context, at->groups, sizeof *groups, "pieces");
     at->stands = ov_alloc(s->context, at->groups, sizeof *at->stands, "pieces");
     if (!groups || !at->stands) {

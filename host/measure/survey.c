@@ -224,8 +224,9 @@ static void find_zones(const ov_surveyor *s, ov_sheet *at) {
                                                 : OV_ZONE_BEYOND;
 }
 
-void ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of) {
+size_t ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of) {
     const ovoid_mesh *const mesh = at->mesh;
+    size_t sets = 0;
     for (size_t v = 0; v < mesh->vertices; ++v)
         of[v] = OV_NO_PIECE;
     for (size_t t = 0; t < mesh->triangles; ++t) {
@@ -238,19 +239,16 @@ void ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of) {
         ov_unite(of, corner[0], corner[1]);
         ov_unite(of, corner[0], corner[2]);
     }
+    for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
+        if (of[v] != OV_NO_PIECE)
+            of[v] = of[v] == v ? (uint32_t)sets++ : of[of[v]];
+    return sets;
 }
 
 /* What hangs together by the triangles in the cell: what does so beyond it only may be an artefact
  * of where its surroundings end. Numbers the pieces. */
 static void find_pieces(ov_sheet *at) {
-    const ovoid_mesh *const mesh = at->mesh;
-    uint32_t *const of = at->piece_of;
-    size_t count = 0;
-    ov_sheet_unite(at, OV_ZONE_CELL, of);
-    for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
-        if (of[v] != OV_NO_PIECE)
-            of[v] = of[v] == v ? (uint32_t)count++ : of[of[v]];
-    at->pieces = count;
+    at->pieces = ov_sheet_unite(at, OV_ZONE_CELL, at->piece_of);
 }
 
 /* Each piece has a place of its own that its volume counts from: what rounding leaves open between
@@ -442,14 +440,10 @@ static ovoid_status find_necks(ov_surveyor *s, const ov_sheet *from, ov_survey_s
     const ovoid_mesh *const mesh = from->mesh;
     ovoid_status status = OVOID_OK;
     necks all = {.surveyor = s, .sheet = from, .side = side};
-    size_t sets = 0;
     uint32_t *const set_of = ov_alloc(s->context, mesh->vertices, sizeof *set_of, "pieces");
     if (!set_of)
         return OVOID_ERROR_MEMORY;
-    ov_sheet_unite(from, joined_zone(s), set_of);
-    for (size_t v = 0; v < mesh->vertices; ++v) /* parents come first */
-        if (set_of[v] != OV_NO_PIECE)
-            set_of[v] = set_of[v] == v ? (uint32_t)sets++ : set_of[set_of[v]];
+    const size_t sets = ov_sheet_unite(from, joined_zone(s), set_of);
     if (sets > 1)
         OV_TRY(unite_outer(s, from, sets, set_of));
     OV_TRY(ov_mesh_near_sets(s->context, mesh, set_of, sets, OV_NECK * s->options->spacing,

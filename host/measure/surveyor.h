@@ -69,8 +69,8 @@ ovoid_status ov_spans_outer(ov_surveyor *surveyor, const ov_survey_standing *sta
 ovoid_status ov_spans_seek(ov_surveyor *surveyor, const ov_survey_standing *standing,
                            ov_survey_far *far, size_t count);
 
-/* Finds which vertices hang together by triangles in this zone or further in: of[v] leads to the
- * first of them (mesh/union.h); OV_NO_PIECE: v is of no such triangle. */
-void ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of);
+/* Finds which vertices hang together by triangles in this zone or further in, and returns how many
+ * such sets there are: of[v] is the number of v's; OV_NO_PIECE: v is of no such triangle. */
+size_t ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of);
 
 #endif

@@ -110,6 +110,8 @@ ovoid_status ov_adaptive_share_atoms(ov_adaptive *f, ov_trial *t);
 ovoid_status ov_adaptive_sort(ov_adaptive *f, ov_trial *t);
 
 ovoid_status ov_adaptive_judge(ov_adaptive *f, ov_trial *t);
+/* A judge like f->judge at another spacing, of meshes, angstrom. */
+ovoid_status ov_adaptive_judge_at(ov_adaptive *f, double spacing, ov_judge *judge);
 
 /* The merged atoms of start `kind` at this count. */
 ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial *t);
@@ -140,8 +142,6 @@ ovoid_status ov_adaptive_begin(ov_adaptive *f, size_t window, size_t kinds, size
 ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best);
 /* The fewest ellipsoids with a deviation of at most `tolerance` angstrom, or the best there is. */
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best);
-/* A judge like f->judge at another spacing, of meshes, angstrom. */
-ovoid_status ov_adaptive_judge_at(ov_adaptive *f, double spacing, ov_judge *judge);
 /* The start, with more ellipsoids where it is off. */
 ovoid_status ov_adaptive_mend(ov_adaptive *f, double tolerance, ov_trial *best);
 

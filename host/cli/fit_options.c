@@ -35,8 +35,11 @@ const cli_number fit_goal_numbers[] = {
 const size_t fit_goal_count = sizeof fit_goal_numbers / sizeof *fit_goal_numbers;
 
 const cli_number fit_adaptive_numbers[] = {
-    COUNT("effort", adaptive.effort, 1, 10,
-          "how much is tried for a better model, up to 10: more starts, more repairs, more time"),
+    COUNT(
+        "effort", adaptive.effort, 0, 10,
+        "how much is tried for a better model, up to 10: more starts, more repairs, more time; 0, "
+        "of so many ellipsoids: the largest distances are not brought down, which takes most of "
+        "the time"),
     COUNT("steps", adaptive.steps, 0, UINT32_MAX,
           "steps of each refinement (Levenberg-Marquardt) at most; 0 leaves the merged Gaussians "
           "as they are"),

@@ -101,7 +101,7 @@ static ovoid_status check_adaptive(ovoid_context *context, const ovoid_adaptive_
     const range ranges[] = {
         {"tolerance", adaptive->tolerance, 0.0, 1e3, true},
         {"ratio", adaptive->ratio, 0.0, 1.0, true},
-        {"effort", adaptive->effort, 1.0, 10.0, false},
+        {"effort", adaptive->effort, 0.0, 10.0, false},
         {"mesh_spacing", adaptive->mesh_spacing, 0.0, 1e3, true},
     };
     if (adaptive->goal != OVOID_GOAL_TOLERANCE && adaptive->goal != OVOID_GOAL_ELLIPSOIDS &&

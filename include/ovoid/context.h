@@ -107,7 +107,7 @@ typedef struct ovoid_progress {
                              (kernels), "selftest" (of a device, at its first use), "field", "mesh",
                              "measure" (distances), "map", "render"; of
                              a fit also "sample"; of l1 "sparse" or "accuracy"; of adaptive "merge",
-                             "refine", "repair", "grow", "shrink", "confirm" or "mend" */
+                             "refine", "repair", "sharpen", "grow", "shrink", "confirm" or "mend" */
     uint64_t done, total; /* of this stage, in parts of its own; total may be OVOID_UNKNOWN */
     double seconds;       /* since the function that was called began */
     int32_t method;       /* of the fit that is under way, one of OVOID_METHOD_...; OVOID_NO_METHOD:

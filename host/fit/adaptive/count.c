@@ -1,4 +1,4 @@
-#include "fit/adaptive/search.h"
+#include "fit/adaptive/sharpen.h"
 
 #include "fit/adaptive/constants.h"
 #include <math.h>
@@ -55,16 +55,24 @@ cleanup:
     return status;
 }
 
+/* What the surface of a part is compared with is not its own alone. */
+static bool sharpens(const ov_adaptive *f) {
+    return f->options->adaptive.effort > 0 && f->options->adaptive.steps > 0 &&
+           !ov_adaptive_is_part(f);
+}
+
 /* From the starts to the last repair, under one window. */
 static ovoid_status fit_window(ov_adaptive *f, size_t count, size_t window, ov_trial *best) {
     ovoid_status status = OVOID_OK;
-    const uint32_t effort = f->options->adaptive.effort;
+    const uint32_t effort = ov_adaptive_effort(f);
     const size_t kinds = 2 * (size_t)effort - 1 < OV_STARTS ? 2 * (size_t)effort - 1 : OV_STARTS;
     OV_TRY(ov_adaptive_begin(f, window, kinds, count, best));
-    if (effort == 1)
-        goto cleanup;
-    OV_TRY(ov_adaptive_judge(f, best));
-    OV_TRY(repair(f, best, ov_tuned.count_repairs * (effort - 1)));
+    if (effort > 1) {
+        OV_TRY(ov_adaptive_judge(f, best));
+        OV_TRY(repair(f, best, ov_tuned.count_repairs * (effort - 1)));
+    }
+    if (sharpens(f))
+        OV_TRY(ov_adaptive_sharpen(f, best));
 cleanup:
     return status;
 }
@@ -92,7 +100,9 @@ static ovoid_status fit_start(ov_adaptive *f, size_t count, ov_trial *best) {
     OV_TRY(ov_adaptive_judge(f, &other));
     if (!keeps || other.judgement.score < best->judgement.score)
         ov_trial_swap(&other, best);
-    OV_TRY(repair(f, best, ov_tuned.count_repairs * (f->options->adaptive.effort - 1)));
+    OV_TRY(repair(f, best, ov_tuned.count_repairs * (ov_adaptive_effort(f) - 1)));
+    if (sharpens(f))
+        OV_TRY(ov_adaptive_sharpen(f, best));
 cleanup:
     ov_trial_destroy(&other);
     return status;
@@ -122,7 +132,7 @@ ovoid_status ov_adaptive_count(ov_adaptive *f, size_t count, ov_trial *best) {
             goto cleanup;
     }
     OV_TRY(fit_window(f, count, 0, best));
-    if (f->options->adaptive.effort == 1)
+    if (ov_adaptive_effort(f) == 1)
         goto cleanup;
     OV_TRY(ov_trial_create(f, &other));
     for (size_t window = 1; window < OV_WINDOWS; ++window) {

@@ -11,6 +11,7 @@ typedef struct growth {
     ov_places places;
     uint32_t *before; /* per spot: how often its place was met before, patience included */
     uint32_t patience;
+    bool in_order;
     bool *chosen;   /* ellipsoids */
     uint32_t *felt; /* those at a place */
 } growth;
@@ -127,7 +128,8 @@ static ovoid_status act(ov_adaptive *f, const char *stage, ov_trial *t, const ov
     OV_TRY(choose(f, t, spots, 0, UINT32_MAX, ov_tuned.grow_refined, g));
     OV_TRY(ov_adaptive_refine_some(f, t, stage, ov_tuned.refine_local_steps, g->chosen));
     OV_TRY(ov_adaptive_share_atoms(f, t));
-    OV_TRY(ov_adaptive_sort(f, t));
+    if (!g->in_order)
+        OV_TRY(ov_adaptive_sort(f, t));
 cleanup:
     return status;
 }
@@ -139,6 +141,7 @@ ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing
                 .chosen = ov_alloc(f->context, f->capacity, sizeof *g.chosen, "ellipsoids"),
                 .felt = ov_alloc(f->context, f->capacity, sizeof *g.felt, "ellipsoids")};
     g.patience = how->patience;
+    g.in_order = how->in_order;
     if (!g.before || !g.chosen || !g.felt) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;

@@ -59,6 +59,12 @@ static inline bool ov_adaptive_is_part(const ov_adaptive *f) {
     return f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0;
 }
 
+/* What is tried where effort 0, which leaves out what only makes a model sharper, tries as much as
+ * 1. */
+static inline uint32_t ov_adaptive_effort(const ov_adaptive *f) {
+    return f->options->adaptive.effort > 1 ? f->options->adaptive.effort : 1;
+}
+
 /* A model with what is known of it. */
 typedef struct ov_trial {
     double *x; /* room for capacity ellipsoids */

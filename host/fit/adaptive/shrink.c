@@ -16,6 +16,7 @@ typedef struct settling {
 /* A model that shrinks. */
 typedef struct shrinking {
     settling how;
+    const char *stage;
     ov_trial next;      /* the best model merged */
     uint32_t *parents;  /* as of ov_merge_cheapest(): in the best model */
     ov_places failed;   /* where merging was too much */
@@ -38,12 +39,13 @@ static settling settling_of(const ov_adaptive *f) {
                       ov_tuned.shrink_emphasis, ov_tuned.shrink_emphasis_reach};
 }
 
-static ovoid_status shrinking_create(ov_adaptive *f, shrinking *s) {
+static ovoid_status shrinking_create(ov_adaptive *f, const char *stage, shrinking *s) {
     ovoid_status status = OVOID_OK;
     *s = (shrinking){.how = settling_of(f),
+                     .stage = stage,
                      .share = ov_tuned.shrink_share,
                      .limit = ov_tuned.shrink_done_first,
-                     .most = ov_tuned.shrink_done * (size_t)f->options->adaptive.effort};
+                     .most = ov_tuned.shrink_done * (size_t)ov_adaptive_effort(f)};
     OV_TRY(ov_trial_create(f, &s->next));
     s->parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
     s->more_parents = ov_alloc(f->context, 2 * f->capacity, sizeof *s->parents, "merges");
@@ -95,10 +97,11 @@ cleanup:
 }
 
 /* Merges what costs least of the best model, in many places at once. */
-static ovoid_status merge(ov_adaptive *f, const ov_trial *best, shrinking *s) {
+static ovoid_status merge(ov_adaptive *f, const ov_trial *best, size_t least, shrinking *s) {
     ovoid_status status = OVOID_OK;
-    const size_t fewer = (size_t)fmax(s->share * (double)best->count, ov_tuned.shrink_tries_min);
-    const ov_merging merging = {.share = ov_tuned.shrink_pairs * f->options->adaptive.effort,
+    const size_t share = (size_t)fmax(s->share * (double)best->count, ov_tuned.shrink_tries_min);
+    const size_t most = best->count - least, fewer = share < most ? share : most;
+    const ov_merging merging = {.share = ov_tuned.shrink_pairs * ov_adaptive_effort(f),
                                 .allowed = allowed,
                                 .user = s,
                                 .apart = ov_tuned.shrink_apart,
@@ -136,7 +139,7 @@ static ovoid_status adapt(ov_adaptive *f, shrinking *s) {
         if (is_merged(s, i))
             memcpy(merged.spot[merged.count++].at, centre_of(s->next.x, i), sizeof merged.spot->at);
     OV_TRY(choose_near(f, &merged, ov_tuned.shrink_adapt, s));
-    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", s->how.steps, s->chosen));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, s->stage, s->how.steps, s->chosen));
 cleanup:
     ov_spots_destroy(&merged);
     return status;
@@ -250,7 +253,7 @@ static ovoid_status back_off(ov_adaptive *f, const ov_trial *best, const ov_spot
     OV_TRY(remember(f, best, s));
     take_back(best, s);
     OV_TRY(choose_near(f, spots, ov_tuned.shrink_back, s));
-    OV_TRY(ov_adaptive_refine_some(f, &s->next, "shrink", s->how.steps, s->chosen));
+    OV_TRY(ov_adaptive_refine_some(f, &s->next, s->stage, s->how.steps, s->chosen));
 cleanup:
     return status;
 }
@@ -268,7 +271,7 @@ static ovoid_status settle(ov_adaptive *f, double tolerance, const ov_trial *bes
     ovoid_status status = OVOID_OK;
     ov_spots spots = {0};
     const ov_growing how = {
-        .stage = "shrink", .most = best->count - 1, .rounds = ov_tuned.shrink_grow_rounds};
+        .stage = s->stage, .most = best->count - 1, .rounds = ov_tuned.shrink_grow_rounds};
     const uint32_t rounds = s->how.chances + s->how.back_rounds;
     OV_TRY(ov_adaptive_spots(f, &s->next, tolerance, f->capacity, &spots));
     for (uint32_t n = 0; n < rounds && spots.count > 0 && s->next.count < best->count; ++n) {
@@ -309,11 +312,11 @@ ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, const ov_shrin
     ovoid_status status = OVOID_OK;
     shrinking s;
     bool idle = false;
-    OV_TRY(shrinking_create(f, &s));
+    OV_TRY(shrinking_create(f, how->stage, &s));
     s.milestone = best->count;
     while (!idle && best->count > how->least) {
         const size_t before = best->count;
-        OV_TRY(merge(f, best, &s));
+        OV_TRY(merge(f, best, how->least, &s));
         const size_t tries = before - s.next.count;
         if (tries == 0 && s.limit >= s.most)
             break;

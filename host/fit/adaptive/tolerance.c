@@ -99,10 +99,11 @@ static ovoid_status take_atoms(ov_adaptive *f, ov_trial *t) {
 /* The model of the last frame was shrunk as far as it goes: only where growing ended with more
  * ellipsoids than frames can do with, and some, they are made fewer. */
 static ovoid_status shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
-    const uint32_t effort = f->options->adaptive.effort;
+    const uint32_t effort = ov_adaptive_effort(f);
     const bool frame = is_frame(f), part = ov_adaptive_is_part(f);
     const double slack = 1.0 + ov_tuned.motion_slack;
-    const ov_shrinking how = {.least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
+    const ov_shrinking how = {.stage = "shrink",
+                              .least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
                               .idle_rounds = effort * (frame  ? ov_tuned.motion_idle_rounds
                                                        : part ? ov_tuned.shrink_part_idle_rounds
                                                               : ov_tuned.shrink_idle_rounds),

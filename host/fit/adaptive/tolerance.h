@@ -14,6 +14,7 @@ typedef struct ov_growing {
     size_t most; /* ellipsoids */
     uint32_t rounds;
     uint32_t patience; /* a place is only refined, with more weight, when it is met so many times */
+    bool in_order;     /* ellipsoids keep their places in the model; only where none is split */
 } ov_growing;
 
 /* Whether the tolerance was seen to hold when the trial was judged last. */
@@ -37,6 +38,7 @@ ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing
 /* When shrinking ends: at so many ellipsoids, or when so many rounds and tries in a row gained next
  * to nothing together. */
 typedef struct ov_shrinking {
+    const char *stage;
     size_t least;
     uint32_t idle_rounds, idle_tries;
 } ov_shrinking;

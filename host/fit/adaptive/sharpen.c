@@ -1,0 +1,84 @@
+#include "fit/adaptive/sharpen.h"
+
+#include "fit/adaptive/constants.h"
+#include "fit/adaptive/tolerance.h"
+
+#include <math.h>
+
+static void multiply_amplitudes(ov_trial *t, double factor) {
+    for (size_t i = 0; i < t->count; ++i)
+        t->x[i * OV_FACTOR_PARAMETERS + OV_FACTOR_AMPLITUDE] += log(factor);
+}
+
+/* Judges a trial with the right volume, as the search will end with it: where the field is flat,
+ * that moves the surface by more than what is gained here. */
+static ovoid_status judge(ov_adaptive *f, ov_trial *t) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_adaptive_judge(f, t));
+    for (uint32_t n = 0; n < ov_tuned.sharpen_volume_steps && t->judgement.valid &&
+                         fabs(t->judgement.volume_ratio - 1.0) > ov_tuned.volume_error;
+         ++n) {
+        multiply_amplitudes(t, ov_judge_amplitude_factor(&f->judge, t->judgement.volume_ratio));
+        OV_TRY(ov_adaptive_judge(f, t));
+    }
+cleanup:
+    return status;
+}
+
+/* More ellipsoids where the trial is off by more than `tolerance`, and as many fewer where they
+ * cost least. Whether it came to that, and to the number, is to be seen from the trial. */
+static ovoid_status exchange(ov_adaptive *f, double tolerance, ov_trial *t) {
+    ovoid_status status = OVOID_OK;
+    ov_spots spots = {0};
+    const size_t count = t->count;
+    const bool frame = f->start && f->start->moved; /* whose ellipsoids are those of the last one */
+    const double more = fmax(ov_tuned.sharpen_more * (double)count, ov_tuned.sharpen_more_min);
+    const ov_growing grow = {.stage = "sharpen",
+                             .most = count + (size_t)more,
+                             .rounds = ov_tuned.sharpen_rounds,
+                             .patience =
+                                 frame ? ov_tuned.sharpen_rounds : ov_tuned.sharpen_patience,
+                             .in_order = frame};
+    const ov_shrinking shrink = {.stage = "sharpen",
+                                 .least = count,
+                                 .idle_rounds = ov_tuned.sharpen_idle_rounds,
+                                 .idle_tries = ov_tuned.sharpen_idle_tries};
+    OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));
+    OV_TRY(ov_adaptive_grow(f, tolerance, &grow, t, &spots));
+    if (ov_trial_holds(t, tolerance) && t->count > count)
+        OV_TRY(ov_adaptive_shrink(f, tolerance, &shrink, t));
+cleanup:
+    ov_spots_destroy(&spots);
+    return status;
+}
+
+static bool is_worth_it(const ov_adaptive *f, const ov_trial *t) {
+    const double enough = ov_tuned.sharpen_enough / sqrt(2.0 * f->options->decay);
+    return t->judgement.valid && t->judgement.deviation > enough;
+}
+
+ovoid_status ov_adaptive_sharpen(ov_adaptive *f, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    const uint32_t failures = ov_tuned.sharpen_failures + f->options->adaptive.effort;
+    double share = ov_tuned.sharpen_share;
+    ov_trial t = {0};
+    OV_TRY(ov_trial_create(f, &t));
+    OV_TRY(judge(f, best));
+    for (uint32_t n = 0; n < failures && is_worth_it(f, best);) {
+        const double tolerance = share * best->judgement.deviation;
+        ov_trial_copy(best, &t);
+        OV_TRY(exchange(f, tolerance, &t));
+        const bool held = t.count == best->count && ov_trial_holds(&t, tolerance);
+        if (held)
+            OV_TRY(judge(f, &t));
+        if (held && t.judgement.score < best->judgement.score) {
+            ov_trial_swap(&t, best);
+        } else {
+            share = sqrt(share);
+            ++n;
+        }
+    }
+cleanup:
+    ov_trial_destroy(&t);
+    return status;
+}

@@ -36,7 +36,7 @@ def options_of(goal):
     option, equals, value = goal.partition("=")
     if option not in ("ellipsoids", "tolerance", "ratio") or not equals:
         sys.exit(f"kernel_times.py: no goal '{goal}': default, ellipsoids=N, tolerance=X or ratio=X")
-    return ["--" + option, value]
+    return ["--" + option, value] + (["--effort", "0"] if option != "tolerance" else [])
 
 
 def fit(arguments, path, goal):

@@ -80,7 +80,7 @@ def errors_of(report):
 
 def fit_ours(arguments, path, ellipsoids):
     """Errors of `ovoid fit`, and its seconds in a warm program."""
-    command = ["fit", path, "--ellipsoids", str(ellipsoids), "-o", os.devnull]
+    command = ["fit", path, "--ellipsoids", str(ellipsoids), "--effort", "0", "-o", os.devnull]
     report = report_of(arguments.ovoid, command)
     lines = subprocess.run([arguments.warm, path, str(ellipsoids), str(arguments.runs)], check=True,
                            capture_output=True, text=True).stdout.splitlines()

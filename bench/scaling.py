@@ -130,6 +130,7 @@ def parse():
     parser.add_argument("--molecules", action="append", required=True, metavar="DIR")
     parser.add_argument("--names", default=",".join(MOLECULES))
     parser.add_argument("--ratio", type=float, default=0.066)
+    parser.add_argument("--effort", type=int, default=0, help="default 0, as in parts")
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--up-to", type=int, default=sys.maxsize, metavar="ATOMS")
     parser.add_argument("--output", metavar="FILE")
@@ -141,7 +142,7 @@ def main():
     constant = locate(arguments.molecules, CONSTANT)
     if constant is None:
         sys.exit(f"scaling.py: no {CONSTANT} in {', '.join(arguments.molecules)}")
-    goal = ["--ratio", str(arguments.ratio)]
+    goal = ["--ratio", str(arguments.ratio), "--effort", str(arguments.effort)]
     jobs = [(name, "ratio " + goal[1], goal) for name in arguments.names.split(",")]
     jobs += [(SMALL, "ratio " + goal[1], goal), (SMALL, "default", [])]
     results = repeat(arguments.ovoid, [constant, *goal], arguments.runs)

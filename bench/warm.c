@@ -28,6 +28,7 @@ int main(int argc, char **argv) {
     }
     ovoid_fit_options_init(&options, sizeof options);
     options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+    options.adaptive.effort = 0; /* least squares alone, as its peers do */
     options.adaptive.ellipsoids = (uint32_t)strtoul(argv[2], NULL, 10);
     if (ovoid_context_create(&context) != OVOID_OK ||
         ovoid_molecule_read(context, argv[1], OVOID_MOLECULE_AUTO, &molecule) != OVOID_OK)

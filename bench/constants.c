@@ -9,9 +9,11 @@
  * early: fits that the file has are left out, and so is the header. The fits:
  *
  *   tolerance  to 0.5 angstrom
- *   number     half as many ellipsoids as that takes
+ *   number     half as many ellipsoids as that takes, with effort 0
+ *   sharpen    the same with effort 1
  *   effort     the same with effort 2
- *   warm       from the model within the tolerance to 3/4 and to 3/2 of its ellipsoids, together
+ *   warm       from the model within the tolerance to 3/4 and to 3/2 of its ellipsoids, together,
+ *              with effort 0
  *   frame      to the tolerance, and in the same session to other coordinates of the atoms, which
  *              alone counts
  *   l1         300 iterations of method l1
@@ -213,8 +215,8 @@ static ovoid_fit_options number(const subject *s, double share) {
     return options;
 }
 
-typedef enum fit_kind { TOLERANCE, NUMBER, EFFORT, WARM, FRAME, L1, KINDS } fit_kind;
-static const char *const kind_names[KINDS] = {"tolerance", "number", "effort",
+typedef enum fit_kind { TOLERANCE, NUMBER, SHARPEN, EFFORT, WARM, FRAME, L1, KINDS } fit_kind;
+static const char *const kind_names[KINDS] = {"tolerance", "number", "sharpen", "effort",
                                               "warm",      "frame",  "l1"};
 
 static void fit(subject *s, ovoid_fitter *fitter, fit_kind kind, sums *sum) {
@@ -225,14 +227,16 @@ static void fit(subject *s, ovoid_fitter *fitter, fit_kind kind, sums *sum) {
         reach(s, fitter, s->field, &options, s->model ? NULL : &s->model, sum);
         return;
     case NUMBER:
+    case SHARPEN:
     case EFFORT:
         options = number(s, 0.5);
-        options.adaptive.effort = kind == EFFORT ? 2 : 1;
+        options.adaptive.effort = kind - NUMBER;
         reach(s, fitter, s->field, &options, NULL, sum);
         return;
     case WARM:
         for (int k = 0; k < 2; ++k) {
             options = number(s, k == 0 ? 0.75 : 1.5);
+            options.adaptive.effort = 0;
             stop(s, ovoid_fitter_start_from(s->context, fitter, s->model));
             reach(s, fitter, s->field, &options, NULL, sum);
         }
@@ -291,12 +295,14 @@ static bool uses(fit_kind kind, const char *name) {
     const bool tolerance = begins(name, "start_") || begins(name, "spots_") ||
                            begins(name, "grow_") || begins(name, "shrink_") ||
                            begins(name, "refine_local_") || begins(name, "merge_");
-    const bool quick = begins(name, "refine_quick_");
+    const bool quick = begins(name, "refine_quick_"), sharpen = begins(name, "sharpen_");
     switch (kind) {
     case TOLERANCE:
-        return !effort && !warm && !l1 && !frame && !quick;
+        return !effort && !warm && !l1 && !frame && !quick && !sharpen;
     case NUMBER:
-        return !effort && !warm && !l1 && !frame && !quick && !tolerance;
+        return !effort && !warm && !l1 && !frame && !quick && !sharpen && !tolerance;
+    case SHARPEN:
+        return sharpen;
     case EFFORT:
         return effort || quick;
     case WARM:

@@ -8,7 +8,7 @@
 
 /* How much the whole surface's distance, cavities included, counts beside the outer one's, and the
  * area's relative error (angstrom). */
-#define SCORE_WHOLE 0.3
+#define SCORE_WHOLE 0.1
 #define SCORE_AREA 10.0
 /* Where spots are looked for, distances below this share of theirs are only bounded. */
 #define ENOUGH 0.8
@@ -149,7 +149,7 @@ static bool is_judged(const ov_judge *judge, const double at[3]) {
 /* Whether a vertex counts; *outer: as one of an outer surface. */
 static bool counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, bool *outer) {
     double at[3];
-    *outer = ov_mesh_is_exposed(mesh, vertex);
+    *outer = judge->whole || ov_mesh_is_exposed(mesh, vertex);
     if (!judge->in_region)
         return true;
     ov_mesh_at(mesh, vertex, at);

@@ -37,6 +37,7 @@ typedef struct ov_judge {
     ov_meter meter, back;   /* of distances from the original, and to it */
     ov_facets facets;       /* of the original */
     ov_facets other;        /* of the model at hand */
+    bool whole;             /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;         /* set by the owner: only the surfaces within this box count, and not */
     double low[3], high[3]; /* their areas: beyond it they may be cut off */
     ov_spot *excused;       /* owned; within `excused_reach` of these it does not count either */

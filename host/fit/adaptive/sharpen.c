@@ -57,27 +57,51 @@ static bool is_worth_it(const ov_adaptive *f, const ov_trial *t) {
     return t->judgement.valid && t->judgement.deviation > enough;
 }
 
-ovoid_status ov_adaptive_sharpen(ov_adaptive *f, ov_trial *best) {
+/* One try, in t: brings what is furthest off, walls of cavities too where `whole`, to a share of
+ * that. *better: the score is, and t is the best model now. */
+static ovoid_status try_once(ov_adaptive *f, double share, bool whole, ov_trial *t, ov_trial *best,
+                             bool *better) {
+    ovoid_status status = OVOID_OK;
+    const ov_judgement *const j = &best->judgement;
+    const double tolerance = share * (whole ? j->hausdorff : j->deviation);
+    ov_trial_copy(best, t);
+    f->judge.whole = whole;
+    OV_TRY(exchange(f, tolerance, t));
+    f->judge.whole = false;
+    *better = t->count == best->count && ov_trial_holds(t, tolerance);
+    if (*better)
+        OV_TRY(judge(f, t));
+    *better = *better && t->judgement.score < j->score;
+    if (*better)
+        ov_trial_swap(t, best);
+cleanup:
+    f->judge.whole = false;
+    return status;
+}
+
+/* Smaller and smaller distances, until so many were too small. */
+static ovoid_status sharpen(ov_adaptive *f, bool whole, ov_trial *t, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     const uint32_t failures = ov_tuned.sharpen_failures + f->options->adaptive.effort;
     double share = ov_tuned.sharpen_share;
+    for (uint32_t n = 0; n < failures && is_worth_it(f, best);) {
+        bool better;
+        OV_TRY(try_once(f, share, whole, t, best, &better));
+        share = better ? share : sqrt(share);
+        n += !better;
+    }
+cleanup:
+    return status;
+}
+
+ovoid_status ov_adaptive_sharpen(ov_adaptive *f, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
     ov_trial t = {0};
     OV_TRY(ov_trial_create(f, &t));
     OV_TRY(judge(f, best));
-    for (uint32_t n = 0; n < failures && is_worth_it(f, best);) {
-        const double tolerance = share * best->judgement.deviation;
-        ov_trial_copy(best, &t);
-        OV_TRY(exchange(f, tolerance, &t));
-        const bool held = t.count == best->count && ov_trial_holds(&t, tolerance);
-        if (held)
-            OV_TRY(judge(f, &t));
-        if (held && t.judgement.score < best->judgement.score) {
-            ov_trial_swap(&t, best);
-        } else {
-            share = sqrt(share);
-            ++n;
-        }
-    }
+    OV_TRY(sharpen(f, true, &t, best));
+    if (best->judgement.hausdorff > best->judgement.deviation)
+        OV_TRY(sharpen(f, false, &t, best));
 cleanup:
     ov_trial_destroy(&t);
     return status;

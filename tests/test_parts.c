@@ -2,6 +2,7 @@
  * Fits in parts (host/fit/parts): how a molecule is cut, surveys of cells beside measures of the
  * whole, models that hold across seams whatever number of workers, and checkpoints.
  */
+#include "device/internal.h"
 #include "measure/partition.h"
 #include "measure/survey.h"
 #include "model/factor.h"
@@ -205,6 +206,37 @@ static ovoid_model *fit(ovoid_context *context, const ovoid_molecule *molecule,
     ovoid_fit_result_init(result, sizeof *result);
     test_check(context, ovoid_fit(context, molecule, options, &model, result));
     return model;
+}
+
+/* What parts and cells took of the host is given back as each is done: the next stage takes as
+ * much. */
+static void leaves_no_buffers(void **state) {
+    ovoid_molecule *molecule = ball(*state, 300);
+    ovoid_fit_options options = in_parts(75, 1);
+    ovoid_measure_options measuring;
+    ovoid_fit_result result;
+    ovoid_field *original = NULL, *sparse = NULL;
+    ovoid_measures measures;
+    test_skip_simulated(*state);
+    const ov_device *const device = (*(ovoid_context **)state)->device;
+    if (device->info.type != OVOID_DEVICE_CPU)
+        skip();
+    options.adaptive.goal = OVOID_GOAL_RATIO;
+    options.adaptive.ratio = 0.1;
+    ovoid_model *model = fit(*state, molecule, &options, &result);
+    assert_true(result.parts > 1);
+    assert_false(ov_pool_empty(device->pool));
+    ovoid_measure_options_init(&measuring, sizeof measuring);
+    measuring.cell_atoms = 75;
+    ovoid_measures_init(&measures, sizeof measures);
+    test_check(*state, ovoid_field_of_molecule(*state, molecule, 0.5, 1.0, &original));
+    test_check(*state, ovoid_field_of_model(*state, model, &sparse));
+    test_check(*state, ovoid_measure(*state, original, sparse, &measuring, &measures));
+    assert_false(ov_pool_empty(device->pool));
+    ovoid_field_destroy(&original);
+    ovoid_field_destroy(&sparse);
+    ovoid_model_destroy(&model);
+    ovoid_molecule_destroy(&molecule);
 }
 
 /* The tolerance holds across seams as a measure of the whole has it, not with many more ellipsoids
@@ -471,6 +503,7 @@ int main(void) {
         cmocka_unit_test(atoms_are_shared_out),
         cmocka_unit_test(level_atoms_are_shared_out),
         cmocka_unit_test(cells_add_up),
+        cmocka_unit_test(leaves_no_buffers),
         cmocka_unit_test(holds_across_seams),
         cmocka_unit_test(threads_do_not_disturb_each_other),
         cmocka_unit_test(numbers_are_shared_out),

@@ -133,6 +133,26 @@ static void test_best(void **state) {
     assert_int_equal(driver.released, 3);
 }
 
+/* Between tasks what is kept goes where it is the host's memory; buffers in use stay. */
+static void test_trim(void **state) {
+    (void)state;
+    ovoid_context *context = new_context();
+    const bool is_host = ovoid_context_device(context)->type == OVOID_DEVICE_CPU;
+    ov_buffer one = buffer_of(context, 100000), other = buffer_of(context, 100000);
+    ov_buffer_destroy(&one);
+    ov_buffers_trim(context);
+    assert_int_equal(driver.released, is_host ? 1 : 0);
+    one = buffer_of(context, 100000);
+    assert_int_equal(driver.created, is_host ? 3 : 2);
+    ov_buffer_destroy(&one);
+    ov_buffer_destroy(&other);
+    ovoid_context_destroy(&context);
+    assert_int_equal(driver.released, driver.created);
+    test_check(NULL, ovoid_context_create(&context));
+    ov_buffers_trim(context); /* no device is open */
+    ovoid_context_destroy(&context);
+}
+
 static void test_bounds(void **state) {
     (void)state;
     enum { BUFFERS = 200 };
@@ -302,7 +322,7 @@ int main(void) {
         cmocka_unit_test(test_bounds),        cmocka_unit_test(test_shortage),
         cmocka_unit_test(test_late_shortage), cmocka_unit_test(test_outlive),
         cmocka_unit_test(test_off),           cmocka_unit_test(test_kernels),
-        cmocka_unit_test(test_counts),
+        cmocka_unit_test(test_counts),        cmocka_unit_test(test_trim),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

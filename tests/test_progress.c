@@ -7,6 +7,7 @@
 #include "support.h"
 
 #include "cli/cli.h"
+#include "cli/forecast.h"
 
 #include <fcntl.h>
 #include <stdlib.h>
@@ -216,6 +217,50 @@ static void time_left_is_that_of_iterations(void **state) {
          "\raccuracy  112/112  30 ellipsoids  error 0.250  0 s left  [####################]\033[K");
 }
 
+static ovoid_progress of_parts(const char *stage, uint64_t done, uint64_t total, double seconds) {
+    ovoid_progress progress = adaptive(stage, 0);
+    progress.done = done;
+    progress.total = total;
+    progress.seconds = seconds;
+    return progress;
+}
+
+static double left(cli_forecast *forecast, const char *stage, uint64_t done, uint64_t total,
+                   double seconds, uint64_t at_once) {
+    const ovoid_progress progress = of_parts(stage, done, total, seconds);
+    return cli_forecast_left(forecast, &progress, at_once);
+}
+
+/* Parts tell how long the others take: once so many are done as are fitted at a time, without those
+ * of a checkpoint, and not in stages that count something else. */
+static void parts_tell_what_is_left(void **state) {
+    (void)state;
+    cli_forecast f = {0};
+    assert_true(left(&f, "compile", 3, 5, 1.0, 1) == 0.0);
+    assert_true(left(&f, "sample", 0, 11, 2.0, 1) == 0.0);
+    assert_true(left(&f, "refine", 0, 11, 9.0, 1) == 0.0);
+    assert_true(left(&f, "sample", 1, 11, 12.0, 1) == 100.0); /* 10 s each, of 10 */
+    assert_true(left(&f, "refine", 1, 11, 15.0, 1) == 97.0);  /* 3 s of them are over */
+    assert_true(left(&f, "refine", 1, 11, 500.0, 1) == 1.0);
+    assert_true(left(&f, "measure", 4, 11, 600.0, 1) == 0.0);
+    assert_true(left(&f, "sample", 6, 11, 602.0, 1) == 500.0);
+    assert_true(left(&f, "mend", 0, 3, 700.0, 1) == 0.0);
+    assert_true(left(&f, "sample", 0, 3, 700.0, 1) == 0.0); /* patches are no parts */
+    assert_true(left(&f, "sample", 1, 3, 800.0, 1) == 0.0);
+    f = (cli_forecast){0};
+    assert_true(left(&f, "sample", 20, 40, 1.0, 2) == 0.0); /* resumed */
+    assert_true(left(&f, "sample", 21, 40, 11.0, 2) == 0.0);
+    assert_true(left(&f, "sample", 22, 40, 13.0, 2) == 6.0 * 18.0);
+    f = (cli_forecast){0};
+    assert_true(left(&f, "sample", 0, 1, 1.0, 1) == 0.0); /* a whole */
+    assert_true(left(&f, "sample", 0, OVOID_UNKNOWN, 1.0, 1) == 0.0);
+    start(false, NULL);
+    show(of_parts("sample", 0, 3, 1.0), "\rsample  0/3 parts  0 points  1 s\033[K");
+    clock_seconds += 1.0;
+    show(of_parts("sample", 1, 3, 41.0),
+         "\rsample  1/3 parts  1 min 20 s left  0 points  41 s\033[K");
+}
+
 static void narrow_terminals_get_what_fits(void **state) {
     (void)state;
     set_width(30); /* 29 columns: the last one would wrap */
@@ -279,6 +324,7 @@ int main(void) {
         cmocka_unit_test_setup(other_work_shows_its_share, reset),
         cmocka_unit_test_setup(what_was_erased_returns, reset),
         cmocka_unit_test_setup(time_left_is_that_of_iterations, reset),
+        cmocka_unit_test_setup(parts_tell_what_is_left, reset),
         cmocka_unit_test_setup(narrow_terminals_get_what_fits, reset),
         cmocka_unit_test_setup(shown_on_terminals_alone, reset),
         cmocka_unit_test(durations),

@@ -40,6 +40,13 @@ __attribute__((format(printf, 1, 2)))
 void
 cli_warning(const char *format, ...);
 
+/* What is worth knowing and no cause to worry. */
+#if defined(__GNUC__)
+__attribute__((format(printf, 1, 2)))
+#endif
+void
+cli_note(const char *format, ...);
+
 /* From now on errors and warnings that do not name `about` begin with it; NULL: with nothing. The
  * text must live until replaced. Forgets the last error. */
 void cli_message_subject(const char *about);

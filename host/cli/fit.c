@@ -4,12 +4,49 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
+
+/* What takes so long is told of, seconds. */
+#define LONG 120.0
+#ifdef __APPLE__
+#define KIB 1.0 /* there ru_maxrss is in bytes */
+#else
+#define KIB 1024.0
+#endif
+
+/* How many parts are fitted at a time. */
+static uint64_t at_once(const fit_job *job) {
+    const uint64_t jobs = job->options.parts.jobs > 1 ? job->options.parts.jobs : 1;
+    return jobs * ovoid_context_device_count(job->context) * (job->shared ? ranks_count() : 1);
+}
+
+/* Says how long a fit in parts takes as soon as parts tell, and what memory it has taken. */
+static void foretell(fit_job *job, const ovoid_progress *progress) {
+    struct rusage usage;
+    char time[64];
+    if (job->quiet || job->forecast_told)
+        return;
+    const double left = cli_forecast_left(&job->forecast, progress, at_once(job));
+    if (left <= 0.0)
+        return;
+    job->forecast_told = true;
+    if (left < LONG || getrusage(RUSAGE_SELF, &usage) != 0)
+        return;
+    cli_print_duration(left, time, sizeof time);
+    cli_note("%llu of %llu parts fitted in %.3g s: the others take about %s, and %s after that; "
+             "memory so far %.2g GB",
+             (unsigned long long)(progress->done - job->forecast.first),
+             (unsigned long long)progress->total, progress->seconds - job->forecast.began, time,
+             job->measure ? "the surfaces are compared and measured" : "the surfaces are compared",
+             (double)usage.ru_maxrss * KIB / 1e9);
+}
 
 /* A signal ends the fit and all that it has made, the time limit the search alone. */
 static bool on_progress(const ovoid_progress *progress, void *user) {
     fit_job *job = user;
     fit_trace_add(&job->tracer, progress);
+    foretell(job, progress);
     if (!cli_on_progress(progress, NULL))
         return false;
     if (job->time_limit > 0.0 && cli_seconds() - job->fit_began >= job->time_limit)

@@ -4,6 +4,7 @@
 #ifndef CLI_FIT_H
 #define CLI_FIT_H
 
+#include "forecast.h"
 #include "measures.h"
 
 /* Records every iteration in a CSV file. A trace that cannot be written ends without ending the
@@ -92,6 +93,8 @@ typedef struct fit_job {
     fit_level levels[FIT_LEVELS_MAX]; /* all have their paths from the start */
     size_t levels_done; /* have their models; fewer than asked for where halving ends */
     fit_trace tracer;
+    cli_forecast forecast;
+    bool forecast_told;
     bool written; /* the models are */
     bool report_failed, owners_failed;
     double fit_began;

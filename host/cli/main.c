@@ -90,6 +90,13 @@ void cli_warning(const char *format, ...) {
     va_end(args);
 }
 
+void cli_note(const char *format, ...) {
+    va_list args;
+    va_start(args, format);
+    free(print_message("note", format, args));
+    va_end(args);
+}
+
 void cli_on_warning(const char *text, void *quiet) {
     if (!*(const bool *)quiet)
         cli_warning("%s", text);

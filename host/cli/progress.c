@@ -1,4 +1,5 @@
 #include "cli.h"
+#include "forecast.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -19,6 +20,7 @@ static struct {
     double at_seconds;        /* where the pace was last measured */
     uint64_t at_iteration;
     const char *label;
+    cli_forecast forecast; /* of a fit in parts */
 } line;
 
 void cli_progress_start(bool quiet, const char *label) {
@@ -91,6 +93,13 @@ static void compose_endless(const ovoid_progress *progress, char *text, size_t w
     if (progress->total != OVOID_UNKNOWN && progress->total > 1) { /* of a molecule in parts */
         snprintf(part, sizeof part, "%llu/%llu parts", (unsigned long long)progress->done,
                  (unsigned long long)progress->total);
+        append(text, width, part);
+    }
+    const double left = cli_forecast_left(&line.forecast, progress, 1);
+    if (left > 0.0) {
+        char duration[64];
+        cli_print_duration(left, duration, sizeof duration);
+        snprintf(part, sizeof part, "%s left", duration);
         append(text, width, part);
     }
     if (progress->iteration > 0) {

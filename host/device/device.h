@@ -166,6 +166,10 @@ ovoid_status ov_buffer_reserve(ovoid_context *context, ov_buffer *buffer, size_t
                                const char *what);
 void ov_buffer_destroy(ov_buffer *buffer);
 
+/* Between tasks: releases the buffers that are kept for the next, where the device's memory is the
+ * host's. What one task took is not held while another one, or another thread, needs it. */
+void ov_buffers_trim(ovoid_context *context);
+
 /* Copies between host and device; `data` is free to change, or whole, on return. A read waits for
  * all that was enqueued; a small write does not. bytes == 0 does nothing. */
 ovoid_status ov_buffer_write(ovoid_context *context, ov_buffer *buffer, size_t offset,

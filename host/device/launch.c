@@ -150,6 +150,11 @@ void ov_buffer_destroy(ov_buffer *buffer) {
     *buffer = (ov_buffer){0};
 }
 
+void ov_buffers_trim(ovoid_context *context) {
+    if (context->device && context->device->info.type == OVOID_DEVICE_CPU)
+        ov_pool_empty(context->device->pool);
+}
+
 /* A copy of the data that stays until the queue is idle; NULL when there is no room, and it has to
  * be written at once. Waiting for each of a fit's thousand writes, a few hundred bytes most of
  * them, would let the device run dry each time. */

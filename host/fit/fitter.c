@@ -7,6 +7,7 @@
 #include "fit/adaptive/constants.h"
 #include "fit/l1/l1.h"
 #include "fit/motion.h"
+#include "fit/need.h"
 #include "fit/options.h"
 #include "fit/parts/parts.h"
 #include "fit/parts/times.h"
@@ -249,6 +250,8 @@ static ovoid_status reach_with_all(ovoid_fitter *fitter, const ovoid_fit_options
     if (!start && ov_parts_wanted(options, fitter->atoms))
         return ov_parts_reach(context, fitter->xyzr, fitter->atoms, &alone, options, began, ranks,
                               found, result);
+    if (!fitter->adaptive)
+        OV_TRY(ov_need_check(context, &(ov_need){fitter->atoms, fitter->atoms, 1}));
     if (!fitter->adaptive)
         OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, NULL, !fitter->once,
                                   &fitter->adaptive));

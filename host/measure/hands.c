@@ -126,6 +126,7 @@ static ovoid_status do_task(ov_hands *hands, ovoid_context *context, size_t numb
         work->begin(task, work->user);
     pthread_mutex_unlock(&hands->lock);
     const ovoid_status status = work->task(context, number, task, work->user);
+    ov_buffers_trim(context);
     pthread_mutex_lock(&hands->lock);
     hands->state[task] = status == OVOID_OK ? DONE : FREE;
     commit(hands);

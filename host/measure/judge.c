@@ -77,10 +77,6 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     OV_TRY(ov_marcher_create(context, &made.marcher));
     OV_TRY(mesh_original(&made, xyzr, atoms, decay));
     ov_marcher_stay(made.marcher);
-    if (made.mesh) {
-        OV_TRY(ov_trail_create(context, made.mesh, false, &made.trail));
-        OV_TRY(ov_facets_set(context, &made.facets, &made.trail, made.origin));
-    }
     *judge = made;
 cleanup:
     if (status != OVOID_OK)
@@ -237,6 +233,20 @@ static void trial_destroy(trial *t) {
     ovoid_mesh_destroy(&t->mesh);
 }
 
+/* Not before somebody asks for distances: of a part that is to have a number of ellipsoids nobody
+ * does, and the facets are the largest that a judge has on the device. */
+static ovoid_status lay_original(ov_judge *judge) {
+    ovoid_status status = OVOID_OK;
+    if (judge->laid)
+        return OVOID_OK;
+    if (!judge->trail.mesh)
+        OV_TRY(ov_trail_create(judge->context, judge->mesh, false, &judge->trail));
+    OV_TRY(ov_facets_set(judge->context, &judge->facets, &judge->trail, judge->origin));
+    judge->laid = true;
+cleanup:
+    return status;
+}
+
 /* Where both surfaces are there, how far they are from one another; the device looks for that while
  * the host finds out what else there is to know of the model's. */
 static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t, ov_content *content) {
@@ -250,6 +260,7 @@ static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t, ov_c
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
+    OV_TRY(lay_original(judge));
     judge->meter.watch = judge->back.watch = &judge->watch;
     judge->meter.enough = judge->back.enough = enough;
     OV_TRY(ov_trail_create(context, t->mesh, false, &trail));

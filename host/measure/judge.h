@@ -35,7 +35,8 @@ typedef struct ov_judge {
     ov_watch watch; /* asked during whatever takes long */
     ov_marcher *marcher;
     ov_meter meter, back;   /* of distances from the original, and to it */
-    ov_facets facets;       /* of the original */
+    ov_facets facets;       /* of the original, */
+    bool laid;              /* once these are there */
     ov_facets other;        /* of the model at hand */
     bool whole;             /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;         /* set by the owner: only the surfaces within this box count, and not */

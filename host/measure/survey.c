@@ -578,6 +578,8 @@ static ovoid_status open_survey(ov_surveyor *s, const ov_survey_terms *terms) {
         find_zones(s, &s->sheet[n]);
         find_pieces(&s->sheet[n]);
     }
+    ov_marcher_destroy(&s->marcher); /* distances take as much, and have no use for it */
+    ov_buffers_trim(s->context);
     if (s->options->meshing)
         *s->options->meshing += ov_seconds() - began;
 cleanup:

@@ -94,3 +94,19 @@ expect_err " angstrom along the line of sight are too deep for a picture of so m
 expect_files a.xyzr a.ovoid far.xyzr many.xyzr small.xyzr stray.xyzr tiny.xyzr
 run "$OVOID" render many.xyzr -o a.png --size 40x30
 expect_code 0
+
+# A fit that memory is clearly too little for, where the system lets a process be held to it (tools that
+# watch memory take all addresses for themselves).
+awk 'BEGIN { for (i = 0; i < 500000; i++)
+    printf "%d %d %d 1.5\n", i % 1000 * 2, int(i / 1000) % 100 * 2, int(i / 100000) * 2 }' >../many.xyzr
+if (ulimit -v 1500000 && "$OVOID" devices) >/dev/null 2>&1; then
+    run sh -c 'ulimit -v 1500000; exec "$0" "$@"' "$OVOID" fit ../many.xyzr --part-atoms 500000 -o b.ovoid
+    expect_code 6
+    expect_err "a fit of 500000 atoms as a whole takes at least 1.6 GB of memory, and there are "
+    expect_err "; fit it in parts (parts.atoms, --part-atoms)"
+    run sh -c 'ulimit -v 1500000; exec "$0" "$@"' "$OVOID" fit ../many.xyzr --part-atoms 100000 --jobs 8 -o b.ovoid
+    expect_code 6
+    expect_err "a fit of 500000 atoms, 8 parts of up to 62500 of them at a time, takes at least 1.6 GB of memory"
+    expect_err "or fewer at a time (parts.jobs, --jobs)"
+    [ ! -e b.ovoid ] || fail "there should be no model"
+fi

@@ -3,6 +3,7 @@
 #include "base/progress.h"
 #include "device/device.h"
 #include "fit/adaptive/constants.h"
+#include "fit/need.h"
 #include "fit/parts/checkpoint.h"
 #include "fit/parts/crew.h"
 #include "fit/parts/patch.h"
@@ -398,6 +399,14 @@ static void destroy(ov_parts *parts, job *j) {
     ov_partition_destroy(&parts->partition);
 }
 
+static ovoid_status check_need(ovoid_context *context, const ov_parts *parts) {
+    ov_need need = {.atoms = parts->atoms, .jobs = parts->options->parts.jobs};
+    for (size_t p = 0; p < parts->partition.count; ++p)
+        if (parts->partition.part[p].count > need.largest)
+            need.largest = parts->partition.part[p].count;
+    return ov_need_check(context, &need);
+}
+
 static ovoid_status prepare(ovoid_context *context, ov_parts *parts, job *j) {
     ovoid_status status = OVOID_OK;
     const ovoid_fit_options *const options = parts->options;
@@ -409,6 +418,7 @@ static ovoid_status prepare(ovoid_context *context, ov_parts *parts, job *j) {
     OV_TRY(ov_partition_create(context, parts->xyzr, parts->atoms, most_of(options, parts->atoms),
                                &parts->partition));
     const size_t count = parts->partition.count;
+    OV_TRY(check_need(context, parts));
     OV_TRY(share_out(context, parts));
     parts->fit = ov_alloc(context, count, sizeof *parts->fit, "parts of a molecule");
     j->cell = ov_alloc(context, count, sizeof *j->cell, "parts of a molecule");

@@ -120,6 +120,7 @@ static void work_on(yard *y, ovoid_context *context, ov_worker *w, size_t p) {
     pthread_mutex_unlock(&y->lock);
     const double began = ov_seconds();
     ovoid_status status = work->task(context, p, done, work->user);
+    ov_buffers_trim(context);
     pthread_mutex_lock(&y->lock);
     const bool made = status == OVOID_OK;
     if (made && work->commit && !work->meet)

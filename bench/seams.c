@@ -193,6 +193,7 @@ static void fit(subject *s, bool by_ratio, size_t parts) {
     ovoid_model *model = NULL;
     ovoid_fit_options_init(&options, sizeof options);
     options.adaptive.goal = by_ratio ? OVOID_GOAL_RATIO : OVOID_GOAL_TOLERANCE;
+    options.adaptive.effort = 0; /* as in parts: nothing is sharpened there */
     options.adaptive.ratio = RATIO;
     options.parts.atoms = parts > 1 ? (uint32_t)part_atoms(s, parts) : 0;
     check(s, ovoid_fit(s->context, s->molecule, &options, &model, NULL));

@@ -73,28 +73,41 @@ static ovoid_status check_leaves(ovoid_context *context, size_t count) {
     return OVOID_OK;
 }
 
+/* Work-items that make a level and, unless above is 0, the one above: see kernels/tree.cl. */
+static size_t makers_of(size_t boxes, cl_uint above) {
+    return above > 0 ? groups_of(groups_of(boxes)) * OV_GROUP : groups_of(boxes);
+}
+
+/* Where the groups of a level begin; 0: there is none. */
+static cl_uint first_group(const ov_tree *tree, unsigned level) {
+    return level < tree->levels ? tree->groups[level] : 0;
+}
+
 ovoid_status ov_tree_grow(ovoid_context *context, const ov_buffer *leaves, size_t count,
                           ov_tree *tree, ov_buffer *boxes) {
     ovoid_status status = OVOID_OK;
-    ov_kernel lowest = {0}, above = {0};
+    ov_kernel lowest = {0}, level_of = {0};
     ov_device *device;
     const cl_uint total = (cl_uint)count;
     OV_TRY(ov_device_get(context, &device));
     OV_TRY(check_leaves(context, count));
     const size_t groups = plan_tree(count, tree), group = ov_item_group(device);
+    cl_uint above = first_group(tree, 1);
     OV_TRY(ov_kernel_create(context, "tree", "tree_leaves", &lowest));
-    OV_TRY(ov_kernel_create(context, "tree", "tree_level", &above));
+    OV_TRY(ov_kernel_create(context, "tree", "tree_level", &level_of));
     OV_TRY(ov_buffer_reserve(context, boxes, groups * OV_GROUP * BOX * sizeof(cl_float),
                              "a tree of boxes"));
-    OV_TRY(OV_LAUNCH(context, &lowest, groups_of(count), group, OV_ARG(total),
+    OV_TRY(OV_LAUNCH(context, &lowest, makers_of(count, above), group, OV_ARG(total), OV_ARG(above),
                      OV_ARG(leaves->memory), OV_ARG(boxes->memory)));
-    for (unsigned level = 1; level < tree->levels; ++level)
-        OV_TRY(OV_LAUNCH(context, &above, groups_of(tree->boxes[level]), group,
+    for (unsigned level = 2; level < tree->levels; level += 2) {
+        above = first_group(tree, level + 1);
+        OV_TRY(OV_LAUNCH(context, &level_of, makers_of(tree->boxes[level], above), group,
                          OV_ARG(tree->boxes[level]), OV_ARG(tree->groups[level - 1]),
-                         OV_ARG(tree->groups[level]), OV_ARG(boxes->memory)));
+                         OV_ARG(tree->groups[level]), OV_ARG(above), OV_ARG(boxes->memory)));
+    }
 cleanup:
     ov_kernel_destroy(&lowest);
-    ov_kernel_destroy(&above);
+    ov_kernel_destroy(&level_of);
     return status;
 }
 

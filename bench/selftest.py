@@ -29,6 +29,8 @@ CHANGES = [
      "item[to++] = group * OV_GROUP + (ov_lowest(bits) ^ 1);"),
     ("lists_of_packs", "lists.cl", "item[cursor[ov_lowest(bits)]++] = term;",
      "item[cursor[ov_lowest(bits)]++] = term ^ 1;"),
+    ("make_few_lists", "lists.cl", "group_term[end] = link[at - 1].y;",
+     "group_term[end] = link[at - 1].y ^ 1;"),
     ("list_reached", "gather.cl", "list[to++] = k;", "list[to++] = k + (to == 3 ? 1 : 0);"),
     ("field", "field.cl", "OV_STORE(sum[v], v *", "OV_STORE(1.00001f * sum[v], v *"),
     ("field_polynomial", "field.cl", "fma(z, (ov_vec)(c8),", "fma(z, (ov_vec)(1.001f * c8),"),

@@ -137,6 +137,17 @@ static inline uint ov_bin(uint group, uint term, uint block) {
     return group * OV_BINS + term / block;
 }
 
+/* Counts an entry in its bin; or hangs it into the chain that begins there, if there is room for
+ * its chunk: link holds the number of the next one, from 1 on, 0 at the end, and the term. */
+static inline void ov_put_in_bin(__global uint *bin, const uint term, const uint chunk,
+                                 const uint entry, const uint room, __global uint2 *link) {
+    const uint at = chunk * OV_CHUNK + entry;
+    if (!link)
+        atomic_inc(bin);
+    else if (chunk < room)
+        link[at] = (uint2)(atomic_xchg(bin, at + 1), term);
+}
+
 #if OV_BY_TEAM
 /* What the values of the team's work-items before this one come to, and in .y those of all. */
 static inline uint2 ov_sum_before(const uint value, const uint sharer, __local uint *scratch) {
@@ -233,14 +244,15 @@ static inline void ov_enter(const uint entry, const uint chunk, const uint group
  *
  * tally, zero at the start: chunks taken, entries of every bin, pairs of every group, pairs of
  * every term. block: terms that share a bin. groups: of packs, 0 where nobody wants their lists,
- * and bins and groups are not counted. */
+ * and bins and groups are not counted. link: null, or bins hold chains (make_few_lists()). */
 OV_LIST_KERNEL void packs_of_terms(const uint terms_count, __global const ov_term *restrict terms,
                                    const ov_tree tree, __global const float *restrict boxes,
                                    const float skin, const uint groups, const uint block,
                                    const uint room, __global uint *restrict tally,
                                    __global uint2 *restrict chain, __global uint *restrict next,
                                    __global uint *restrict entry_group,
-                                   __global ushort *restrict entry_bits) {
+                                   __global ushort *restrict entry_bits,
+                                   __global uint2 *restrict link) {
     __local ov_walk walk;
     const uint index = get_group_id(0), sharer = get_local_id(0);
     const int levels = (int)tree.levels;
@@ -284,7 +296,8 @@ OV_LIST_KERNEL void packs_of_terms(const uint terms_count, __global const ov_ter
                 ov_enter(entry, into, group[sharer], walk.bits[sharer], room, entry_group,
                          entry_bits);
                 if (groups > 0) {
-                    atomic_inc(&bins[ov_bin(group[sharer], index, block)]);
+                    ov_put_in_bin(&bins[ov_bin(group[sharer], index, block)], index, into,
+                                  entry % OV_CHUNK, room, link);
                     atomic_add(&pairs[group[sharer]], popcount(walk.bits[sharer]));
                 }
             }
@@ -348,7 +361,7 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
                              const float skin, const uint groups, const uint block, const uint room,
                              __global uint *restrict tally, __global uint2 *restrict chain,
                              __global uint *restrict next, __global uint *restrict entry_group,
-                             __global ushort *restrict entry_bits) {
+                             __global ushort *restrict entry_bits, __global uint2 *restrict link) {
     /* A copy, made where all work-items still run together: Mesa's compiler does not look up kernel
      * arguments by an index that differs between them. */
     const int levels = (int)tree.levels;
@@ -399,12 +412,13 @@ __kernel void packs_of_terms(const uint terms_count, __global const ov_term *res
                             entry_group[at] = group;
                             entry_bits[at] = (ushort)own;
                         }
-                        const uint packs = popcount(own);
+                        const uint packs = popcount(own), entry = entries % OV_CHUNK;
                         found += packs;
                         ++entries;
                         if (groups == 0)
                             continue;
-                        atomic_inc(&bins[ov_bin(group, index, block)]);
+                        ov_put_in_bin(&bins[ov_bin(group, index, block)], index, chunk, entry, room,
+                                      link);
                         atomic_add(&pairs[group], packs);
                     }
                     pending[0] = 0;
@@ -512,6 +526,43 @@ __kernel void scan_lists(const uint terms_count, const uint groups, const uint4 
  * group_term, group_bits: the entries of each group of packs; place holds where each bin begins,
  * and afterwards ends, and the order within a bin depends on timing. start or place may be null:
  * nobody wants these lists. */
+#if !OV_BY_TEAM
+/* Lists the packs of a term from its entries, from item[to] on. */
+static inline void ov_list_term(const uint2 own, uint to, __global const uint *next,
+                                __global const uint *entry_group, __global const ushort *entry_bits,
+                                __global uint *item) {
+    uint chunk = own.x;
+    for (uint k = 0; k < own.y; ++k) {
+        if (k > 0 && k % OV_CHUNK == 0)
+            chunk = next[chunk];
+        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
+        for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
+            item[to++] = entry_group[at] * OV_GROUP + ov_lowest(bits);
+    }
+}
+#else
+static inline void ov_list_term(const uint2 own, uint to, const uint sharer, __local uint *scratch,
+                                __global const uint *next, __global const uint *entry_group,
+                                __global const ushort *entry_bits, __global uint *item) {
+    uint chunk = own.x, reached = 0; /* the latter counts chunks along the chain */
+    for (uint first = 0; first < own.y; first += OV_TEAM) {
+        const uint entry = first + sharer;
+        uint group = 0, bits = 0;
+        if (entry < own.y) {
+            for (; reached < entry / OV_CHUNK; ++reached)
+                chunk = next[chunk];
+            const size_t at = (size_t)chunk * OV_CHUNK + entry % OV_CHUNK;
+            group = entry_group[at];
+            bits = entry_bits[at];
+        }
+        const uint2 packs = ov_sum_before(popcount(bits), sharer, scratch);
+        for (uint own_to = to + packs.x; bits != 0; bits &= bits - 1)
+            item[own_to++] = group * OV_GROUP + ov_lowest(bits);
+        to += packs.y;
+    }
+}
+#endif
+
 #if OV_BY_TEAM
 OV_LIST_KERNEL void
 hand_out_entries(const uint terms_count, const uint block, __global const uint2 *restrict chain,
@@ -626,6 +677,56 @@ static inline void ov_sort(const uint first, const uint end, const uint sharer, 
 }
 #endif
 
+#if OV_BY_TEAM
+/* Lists the packs of a group from its entries, which are in order, from item[at] on. Several
+ * work-items per pack, each with a stretch of the entries. */
+static inline void ov_list_packs(const uint first, const uint end, const uint at, const uint group,
+                                 const uint groups, const uint packs, const uint sharer,
+                                 __local uint *scratch, __global const uint *group_term,
+                                 __global const ushort *group_bits, __global uint *start,
+                                 __global uint *item) {
+    const uint j = sharer / OV_ABREAST, share = sharer % OV_ABREAST;
+    const uint each = (end - first + OV_ABREAST - 1) / OV_ABREAST;
+    const uint from = min(first + share * each, end), stop = min(from + each, end);
+    uint count = 0;
+    for (uint k = from; k < stop; ++k)
+        count += group_bits[k] >> j & 1u;
+    const uint2 before = ov_sum_before(count, sharer, scratch);
+    uint to = at + before.x;
+    if (share == 0 && group * OV_GROUP + j < packs)
+        start[group * OV_GROUP + j] = to;
+    if (sharer == 0 && group == groups - 1)
+        start[packs] = at + before.y;
+    for (uint k = from; k < stop; ++k)
+        if (group_bits[k] >> j & 1u)
+            item[to++] = group_term[k];
+}
+#else
+/* Lists the packs of a group from its entries, which are in order, from item[at] on; counts: how
+ * many each pack has. */
+static inline void ov_list_packs(const uint first, const uint end, uint at, const uint16 counts,
+                                 const uint group, const uint groups, const uint packs,
+                                 __global const uint *group_term, __global const ushort *group_bits,
+                                 __global uint *start, __global uint *item) {
+    uint cursor[OV_GROUP];
+    vstore16(counts, 0, cursor);
+    for (uint j = 0; j < OV_GROUP; ++j) {
+        const uint count = cursor[j];
+        cursor[j] = at;
+        if (group * OV_GROUP + j < packs)
+            start[group * OV_GROUP + j] = at;
+        at += count;
+    }
+    if (group == groups - 1)
+        start[packs] = at;
+    for (uint k = first; k < end; ++k) {
+        const uint term = group_term[k];
+        for (uint bits = group_bits[k]; bits != 0; bits &= bits - 1)
+            item[cursor[ov_lowest(bits)]++] = term;
+    }
+}
+#endif
+
 /* The terms of every pack in ascending order, so that sums have one order: the entries of a group
  * are sorted, and the lists of its packs made from them.
  *
@@ -650,22 +751,8 @@ OV_LIST_KERNEL void lists_of_packs(const uint groups, const uint packs,
         ov_sort(from_bin, to_bin, sharer, term, bits, group_term, group_bits);
         from_bin = to_bin;
     }
-    /* Several work-items per pack, each with a stretch of the entries. */
-    const uint j = sharer / OV_ABREAST, share = sharer % OV_ABREAST;
-    const uint each = (end - first + OV_ABREAST - 1) / OV_ABREAST;
-    const uint from = min(first + share * each, end), stop = min(from + each, end);
-    uint count = 0;
-    for (uint k = from; k < stop; ++k)
-        count += group_bits[k] >> j & 1u;
-    const uint2 before = ov_sum_before(count, sharer, scratch);
-    uint to = pair_start[group] + before.x;
-    if (share == 0 && group * OV_GROUP + j < packs)
-        start[group * OV_GROUP + j] = to;
-    if (sharer == 0 && group == groups - 1)
-        start[packs] = to + before.y;
-    for (uint k = from; k < stop; ++k)
-        if (group_bits[k] >> j & 1u)
-            item[to++] = group_term[k];
+    ov_list_packs(first, end, pair_start[group], group, groups, packs, sharer, scratch, group_term,
+                  group_bits, start, item);
 }
 #else
 __kernel void lists_of_packs(const uint groups, const uint packs,
@@ -683,22 +770,142 @@ __kernel void lists_of_packs(const uint groups, const uint packs,
     uint16 counts = 0;
     for (uint k = first; k < end; ++k)
         counts += (uint16)(ov_sort_in(first, k, group_term, group_bits)) >> lane & 1u;
-    uint cursor[OV_GROUP];
-    vstore16(counts, 0, cursor);
-    uint at = pair_start[group];
-    for (uint j = 0; j < OV_GROUP; ++j) {
-        const uint count = cursor[j];
-        cursor[j] = at;
-        if (group * OV_GROUP + j < packs)
-            start[group * OV_GROUP + j] = at;
-        at += count;
+    ov_list_packs(first, end, pair_start[group], counts, group, groups, packs, group_term,
+                  group_bits, start, item);
+}
+#endif
+
+/* ---- few --------------------------------------------------------------------------------------
+ */
+
+/* What the numbers before number `index` come to, and in .y all of them. */
+static inline uint2 ov_sum_few(__global const uint *number, const uint count, const uint index) {
+    uint before = 0, all = 0;
+    for (uint k = 0; k < index; ++k)
+        before += number[k];
+    for (uint k = index; k < count; ++k)
+        all += number[k];
+    return (uint2)(before, before + all);
+}
+
+/* All lists from the chains of packs_of_terms(), in one launch: where terms and groups are few,
+ * each finds out by itself where its lists begin. A work-item or team for each group of packs, then
+ * for each term. tally: what was counted; spare: that of the next time, which is made zero where
+ * the last one has left something: `used` words. group_term, group_bits: room for as many entries
+ * as there are pairs. pack_start, term_start may be null. totals: as of scan_lists(). */
+#if OV_BY_TEAM
+OV_LIST_KERNEL void
+make_few_lists(const uint terms_count, const uint groups, const uint packs, const uint4 room,
+               __global const uint *restrict tally, const uint used, __global uint *restrict spare,
+               __global const uint2 *restrict chain, __global const uint *restrict next,
+               __global const uint *restrict entry_group,
+               __global const ushort *restrict entry_bits, __global const uint2 *restrict link,
+               __global uint *group_term, __global ushort *group_bits,
+               __global uint *restrict pack_start, __global uint *restrict pack_item,
+               __global uint *restrict term_start, __global uint *restrict term_item,
+               __global uint *restrict totals) {
+    __local uint scratch[OV_TEAM], term[OV_SORTED], entries;
+    __local ushort bits[OV_SORTED];
+    const uint place = get_group_id(0), sharer = get_local_id(0);
+    const bool of_group = place < groups;
+    const uint index = of_group ? place : place - groups;
+    __global const uint *const heads = tally + 1;
+    __global const uint *const pairs = heads + (size_t)groups * OV_BINS, *const found =
+                                                                             pairs + groups;
+    const uint count = of_group ? groups : terms_count;
+    __global const uint *const counted = of_group ? pairs : found;
+    uint before = 0, all = 0;
+    for (uint k = sharer; k < count; k += OV_TEAM)
+        before += k < index ? counted[k] : 0;
+    for (uint k = sharer; k < terms_count; k += OV_TEAM)
+        all += found[k];
+    const uint begin = ov_sum_before(before, sharer, scratch).y,
+               items = ov_sum_before(all, sharer, scratch).y;
+    const bool fits = tally[0] <= room.x && items <= room.z;
+    if (sharer == 0)
+        entries = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (of_group && fits && sharer < OV_BINS)
+        for (uint at = heads[index * OV_BINS + sharer]; at > 0; at = link[at - 1].x) {
+            const uint to = begin + atomic_inc(&entries);
+            group_term[to] = link[at - 1].y;
+            group_bits[to] = entry_bits[at - 1];
+        }
+    barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
+    const uint end = begin + entries, at = fits ? begin : 0;
+    ov_sort(begin, end, sharer, term, bits, group_term, group_bits);
+    /* All meet all barriers: neither does anything for the other's groups. */
+    ov_list_packs(begin, end, at, of_group ? index : 0, of_group ? groups : UINT_MAX,
+                  of_group ? packs : 0, sharer, scratch, group_term, group_bits, pack_start,
+                  pack_item);
+    const bool listed = !of_group && term_start && fits;
+    ov_list_term(listed ? chain[index] : (uint2)(0, 0), begin, sharer, scratch, next, entry_group,
+                 entry_bits, term_item);
+    if (!of_group && term_start && sharer == 0) {
+        term_start[index] = at;
+        if (index == terms_count - 1)
+            term_start[terms_count] = fits ? items : 0;
     }
-    if (group == groups - 1)
-        start[packs] = at;
-    for (uint k = first; k < end; ++k) {
-        const uint term = group_term[k];
-        for (uint bits = group_bits[k]; bits != 0; bits &= bits - 1)
-            item[cursor[ov_lowest(bits)]++] = term;
+    for (uint k = get_global_id(0); k < used; k += get_global_size(0))
+        spare[k] = 0;
+    if (place == groups && sharer == 0)
+        vstore4((uint4)(tally[0], 0, items, 0), 0, totals);
+    if (place == groups && sharer == 0)
+        totals[4] = fits;
+}
+#else
+__kernel void make_few_lists(const uint terms_count, const uint groups, const uint packs,
+                             const uint4 room, __global const uint *restrict tally, const uint used,
+                             __global uint *restrict spare, __global const uint2 *restrict chain,
+                             __global const uint *restrict next,
+                             __global const uint *restrict entry_group,
+                             __global const ushort *restrict entry_bits,
+                             __global const uint2 *restrict link, __global uint *group_term,
+                             __global ushort *group_bits, __global uint *restrict pack_start,
+                             __global uint *restrict pack_item, __global uint *restrict term_start,
+                             __global uint *restrict term_item, __global uint *restrict totals) {
+    const uint place = get_global_id(0);
+    if (place >= groups + terms_count)
+        return;
+    const bool of_group = place < groups;
+    const uint index = of_group ? place : place - groups;
+    __global const uint *const heads = tally + 1;
+    __global const uint *const pairs = heads + (size_t)groups * OV_BINS, *const found =
+                                                                             pairs + groups;
+    const uint2 own = ov_sum_few(of_group ? pairs : found, of_group ? groups : terms_count, index);
+    const uint items = of_group ? ov_sum_few(found, terms_count, 0).y : own.y;
+    const bool fits = tally[0] <= room.x && items <= room.z;
+    const uint begin = fits ? own.x : 0;
+    if (of_group) {
+        const uint16 lane = (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+        uint16 counts = 0;
+        uint end = begin;
+        for (uint bin = 0; fits && bin < OV_BINS; ++bin) {
+            const uint first = end;
+            for (uint at = heads[index * OV_BINS + bin]; at > 0; at = link[at - 1].x) {
+                group_term[end] = link[at - 1].y;
+                group_bits[end] = entry_bits[at - 1];
+                counts += (uint16)(ov_sort_in(first, end, group_term, group_bits)) >> lane & 1u;
+                ++end;
+            }
+        }
+        ov_list_packs(begin, end, begin, counts, index, groups, packs, group_term, group_bits,
+                      pack_start, pack_item);
+    } else if (term_start) {
+        term_start[index] = begin;
+        if (index == terms_count - 1)
+            term_start[terms_count] = fits ? items : 0;
+        if (fits)
+            ov_list_term(chain[index], begin, next, entry_group, entry_bits, term_item);
+    }
+    for (uint k = place; k < used; k += groups + terms_count)
+        spare[k] = 0;
+    if (place == groups) {
+        totals[0] = tally[0];
+        totals[1] = 0;
+        totals[2] = items;
+        totals[3] = 0;
+        totals[4] = fits;
     }
 }
 #endif

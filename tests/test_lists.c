@@ -420,13 +420,13 @@ static void expect_same_pairs(const pairs *a, const pairs *b) {
 }
 
 /* In memory that suffices the lists are the same; else they are empty, and said not to be whole. */
-static void built_without_waiting(void **state) {
+static void expect_built_without_waiting(void **state, size_t terms) {
     bench small, large;
     ov_lists lists = {0};
     pairs wanted, got;
     bool whole = false;
     random_bench(&small, *state, MODEL_RANDOM, 5, test_size(1000, 200), 1e-4, 70);
-    random_bench(&large, *state, MODEL_RANDOM, test_size(200, 40), test_size(2000, 300), 1e-4, 71);
+    random_bench(&large, *state, MODEL_RANDOM, terms, test_size(3000, 300), 1e-4, 71);
     assert_false(ov_lists_built(&lists));
     test_check(*state, ov_lists_build(*state, &lists, &small.points, &small.terms, 0.0));
     assert_true(ov_lists_built(&lists));
@@ -454,6 +454,49 @@ static void built_without_waiting(void **state) {
     ov_lists_destroy(&lists);
     bench_destroy(&small);
     bench_destroy(&large);
+}
+
+/* Few are made in two launches, many in four. */
+static void built_without_waiting(void **state) {
+    const size_t few = test_size(200, 40), many = 1100;
+    expect_built_without_waiting(state, few);
+    if (!test_small())
+        expect_built_without_waiting(state, many);
+}
+
+/* The memory of few serves others, of more and of fewer terms and packs, packs alone or both. */
+static void few_lists_repeat(void **state) {
+    static const size_t terms[] = {60, 900, 3, 200, 1, 60},
+                        points[] = {3000, 2000, 6000, 1000, 1500, 3000};
+    const size_t rounds = test_size(sizeof terms / sizeof *terms, 3);
+    ov_lists lists = {0};
+    for (size_t n = 0; n < rounds; ++n) {
+        bench b;
+        pairs wanted;
+        bool whole = false;
+        random_bench(&b, *state, MODEL_RANDOM, test_size(terms[n], 3 + 10 * n),
+                     test_size(points[n], 300), 1e-4, 80 + n);
+        read_pairs(*state, &b.lists, &wanted);
+        for (int round = 0; round < 3; ++round) {
+            lists.packs_only = round == 1;
+            test_check(*state, round == 0
+                                   ? ov_lists_build(*state, &lists, &b.points, &b.terms, 0.0)
+                                   : ov_lists_begin(*state, &lists, &b.points, &b.terms, 0.0));
+            if (round > 0)
+                test_check(*state, ov_lists_end(*state, &lists, &whole));
+            assert_true(round == 0 || whole);
+            uint32_t *const start = read_indices(*state, &lists.pack_start, b.points.packs + 1);
+            uint32_t *const item = read_indices(*state, &lists.pack_item, lists.items);
+            assert_memory_equal(start, wanted.pack_start, (b.points.packs + 1) * sizeof *start);
+            assert_memory_equal(item, wanted.pack_item, lists.items * sizeof *item);
+            free(start);
+            free(item);
+        }
+        lists.packs_only = false;
+        free_pairs(&wanted);
+        bench_destroy(&b);
+    }
+    ov_lists_destroy(&lists);
 }
 
 /* Entries come to their group in whatever order work-items happen to run; here, in the worst one.
@@ -587,6 +630,7 @@ int main(void) {
         cmocka_unit_test(either_list_alone),
         cmocka_unit_test(counts_become_starts),
         cmocka_unit_test(built_without_waiting),
+        cmocka_unit_test(few_lists_repeat),
         cmocka_unit_test(lists_are_sorted_on_the_device),
         cmocka_unit_test(wide_terms_find_room),
         cmocka_unit_test(lists_are_reproducible),

@@ -165,7 +165,10 @@ typedef struct ov_lists {
     ov_buffer pack_item;  /* terms of each pack, ascending */
     /* Scratch, kept for the next time (kernels/lists.cl). */
     ov_buffer tally, totals, chain, next, entry_group, entry_bits, place, group_term, group_bits;
-    ov_kernel packs_of_terms, scan_lists, hand_out_entries, lists_of_packs;
+    ov_buffer link, few_term, few_bits;
+    ov_buffer few_tally[2]; /* the next one, and the last one, */
+    size_t few_used[2];     /* words of them that are not zero */
+    ov_kernel packs_of_terms, scan_lists, hand_out_entries, lists_of_packs, make_few_lists;
     size_t room_chunks, room_entries, room_items; /* what there is room for: as asked for, so that
                                                      what is launched does not go with buffers */
     bool built;

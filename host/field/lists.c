@@ -39,6 +39,7 @@ static ovoid_status prepare(ovoid_context *context, ov_lists *lists) {
     OV_TRY(ov_kernel_create(context, "lists", "scan_lists", &lists->scan_lists));
     OV_TRY(ov_kernel_create(context, "lists", "hand_out_entries", &lists->hand_out_entries));
     OV_TRY(ov_kernel_create(context, "lists", "lists_of_packs", &lists->lists_of_packs));
+    OV_TRY(ov_kernel_create(context, "lists", "make_few_lists", &lists->make_few_lists));
     OV_TRY(ov_kernel_create(context, "lists", "packs_of_terms", &lists->packs_of_terms));
 cleanup:
     return status;
@@ -70,41 +71,49 @@ cleanup:
  * fitted. */
 enum { CHUNKS, ENTRIES, ITEMS, ITEMS_HIGH, FITS, TOTALS };
 
-/* Zeros at the beginning alone: who counts leaves them behind. */
-static ovoid_status reserve_tally(ovoid_context *context, ov_lists *lists, const plan *p) {
+/* Room for so many words. Zeros at the beginning alone: who counts leaves them behind. */
+static ovoid_status reserve_tally(ovoid_context *context, ov_buffer *tally, size_t words) {
     ovoid_status status = OVOID_OK;
-    const size_t bytes = p->counters * sizeof(cl_uint);
+    const size_t bytes = words * sizeof(cl_uint);
     uint32_t *zero = NULL;
-    if (lists->tally.memory && bytes <= lists->tally.bytes)
+    if (tally->memory && bytes <= tally->bytes)
         return OVOID_OK;
-    OV_TRY(ov_buffer_reserve(context, &lists->tally, bytes, "counts of lists"));
-    zero = ov_alloc(context, lists->tally.bytes, 1, "counts of lists");
+    OV_TRY(ov_buffer_reserve(context, tally, bytes, "counts of lists"));
+    zero = ov_alloc(context, tally->bytes, 1, "counts of lists");
     if (!zero)
         status = OVOID_ERROR_MEMORY;
     else
-        status = ov_buffer_write(context, &lists->tally, 0, zero, lists->tally.bytes);
+        status = ov_buffer_write(context, tally, 0, zero, tally->bytes);
 cleanup:
     free(zero);
     if (status != OVOID_OK)
-        ov_buffer_destroy(&lists->tally); /* it may hold anything */
+        ov_buffer_destroy(tally); /* it may hold anything */
     return status;
+}
+
+/* Finds the entries of all terms; link: NULL, or that of chains. */
+static ovoid_status launch_walk(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                                const ov_terms *terms, double skin, const plan *p, cl_uint chunks,
+                                const ov_buffer *tally, const ov_buffer *link) {
+    const cl_float grow = (cl_float)(skin + (double)points->rounding);
+    const cl_mem chains = link ? link->memory : NULL; /* null in the kernel */
+    return OV_LAUNCH(
+        context, &lists->packs_of_terms, p->terms * p->team, p->group, OV_ARG(p->terms),
+        OV_ARG(terms->device.memory), OV_ARG(points->tree), OV_ARG(points->boxes.memory),
+        OV_ARG(grow), OV_ARG(p->groups), OV_ARG(p->block), OV_ARG(chunks), OV_ARG(tally->memory),
+        OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory), OV_ARG(lists->entry_group.memory),
+        OV_ARG(lists->entry_bits.memory), OV_ARG(chains));
 }
 
 /* One walk of all terms, and where what it counted begins. room: for chunks, entries and pairs. */
 static ovoid_status walk(ovoid_context *context, ov_lists *lists, const ov_points *points,
                          const ov_terms *terms, double skin, const plan *p, cl_uint4 room) {
     ovoid_status status = OVOID_OK;
-    const cl_uint chunks = room.s[CHUNKS];
-    const cl_float grow = (cl_float)(skin + (double)points->rounding);
     const cl_mem place = lists->terms_only ? NULL : lists->place.memory; /* null in the kernel */
     const cl_mem start = lists->packs_only ? NULL : lists->term_start.memory;
-    OV_TRY(reserve_tally(context, lists, p));
-    OV_TRY(OV_LAUNCH(context, &lists->packs_of_terms, p->terms * p->team, p->group,
-                     OV_ARG(p->terms), OV_ARG(terms->device.memory), OV_ARG(points->tree),
-                     OV_ARG(points->boxes.memory), OV_ARG(grow), OV_ARG(p->groups),
-                     OV_ARG(p->block), OV_ARG(chunks), OV_ARG(lists->tally.memory),
-                     OV_ARG(lists->chain.memory), OV_ARG(lists->next.memory),
-                     OV_ARG(lists->entry_group.memory), OV_ARG(lists->entry_bits.memory)));
+    OV_TRY(reserve_tally(context, &lists->tally, p->counters));
+    OV_TRY(
+        launch_walk(context, lists, points, terms, skin, p, room.s[CHUNKS], &lists->tally, NULL));
     OV_TRY(OV_LAUNCH(context, &lists->scan_lists, p->scan, p->scan, OV_ARG(p->terms),
                      OV_ARG(p->groups), OV_ARG(room), OV_ARG(lists->tally.memory), OV_ARG(place),
                      OV_ARG(start), OV_ARG(lists->totals.memory)));
@@ -255,6 +264,69 @@ static cl_uint4 rooms_of(const ov_lists *lists) {
         {(cl_uint)lists->room_chunks, (cl_uint)entries, (cl_uint)lists->room_items, 0}};
 }
 
+/* Few enough for each to find out by itself where its lists begin. */
+#define FEW_TERMS 1024
+#define FEW_GROUPS 1024
+
+static bool are_few(const ov_lists *lists, const plan *p) {
+    return !lists->terms_only && p->terms > 0 && p->terms <= FEW_TERMS && p->groups > 0 &&
+           p->groups <= FEW_GROUPS;
+}
+
+static ovoid_status reserve_few(ovoid_context *context, ov_lists *lists, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    const size_t entries = lists->room_chunks * OV_CHUNK;
+    for (size_t k = 0; k < 2; ++k) {
+        const cl_mem before = lists->few_tally[k].memory;
+        OV_TRY(reserve_tally(context, &lists->few_tally[k], p->counters));
+        if (lists->few_tally[k].memory != before)
+            lists->few_used[k] = 0;
+    }
+    OV_TRY(ov_buffer_reserve(context, &lists->link, entries * sizeof(cl_uint2), "chains of lists"));
+    OV_TRY(ov_buffer_reserve(context, &lists->few_term, lists->room_items * sizeof(cl_uint),
+                             "groups of packs"));
+    OV_TRY(ov_buffer_reserve(context, &lists->few_bits, lists->room_items * sizeof(cl_ushort),
+                             "groups of packs"));
+cleanup:
+    return status;
+}
+
+/* The next time counts where the last one has been made zero. */
+static void swap_tallies(ov_lists *lists, size_t used) {
+    const ov_buffer swap = lists->few_tally[0];
+    lists->few_tally[0] = lists->few_tally[1];
+    lists->few_tally[1] = swap;
+    lists->few_used[1] = used;
+    lists->few_used[0] = 0;
+}
+
+/* All lists in two launches. */
+static ovoid_status make_few(ovoid_context *context, ov_lists *lists, const ov_points *points,
+                             const ov_terms *terms, double skin, const plan *p) {
+    ovoid_status status = OVOID_OK;
+    const cl_uint4 room = rooms_of(lists);
+    const cl_mem start = lists->packs_only ? NULL : lists->term_start.memory;
+    const cl_mem item = lists->packs_only ? NULL : lists->term_item.memory;
+    OV_TRY(reserve_few(context, lists, p));
+    const cl_uint used = (cl_uint)lists->few_used[1];
+    OV_TRY(launch_walk(context, lists, points, terms, skin, p, room.s[CHUNKS], &lists->few_tally[0],
+                       &lists->link));
+    OV_TRY(OV_LAUNCH(context, &lists->make_few_lists, ((size_t)p->groups + p->terms) * p->team,
+                     p->group, OV_ARG(p->terms), OV_ARG(p->groups), OV_ARG(p->packs), OV_ARG(room),
+                     OV_ARG(lists->few_tally[0].memory), OV_ARG(used),
+                     OV_ARG(lists->few_tally[1].memory), OV_ARG(lists->chain.memory),
+                     OV_ARG(lists->next.memory), OV_ARG(lists->entry_group.memory),
+                     OV_ARG(lists->entry_bits.memory), OV_ARG(lists->link.memory),
+                     OV_ARG(lists->few_term.memory), OV_ARG(lists->few_bits.memory),
+                     OV_ARG(lists->pack_start.memory), OV_ARG(lists->pack_item.memory),
+                     OV_ARG(start), OV_ARG(item), OV_ARG(lists->totals.memory)));
+    swap_tallies(lists, p->counters);
+cleanup:
+    for (size_t k = 0; k < 2 && status != OVOID_OK; ++k)
+        ov_buffer_destroy(&lists->few_tally[k]); /* they may hold anything */
+    return status;
+}
+
 ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_points *points,
                             const ov_terms *terms, double skin) {
     ovoid_status status = OVOID_OK;
@@ -268,10 +340,13 @@ ovoid_status ov_lists_begin(ovoid_context *context, ov_lists *lists, const ov_po
     if (!lists->terms_only)
         OV_TRY(ov_buffer_reserve(context, &lists->pack_start,
                                  (p.packs + (size_t)1) * sizeof(cl_uint), "starts of lists"));
-    OV_TRY(walk(context, lists, points, terms, skin, &p, rooms_of(lists)));
+    const bool few = are_few(lists, &p);
+    OV_TRY(few ? make_few(context, lists, points, terms, skin, &p)
+               : walk(context, lists, points, terms, skin, &p, rooms_of(lists)));
     OV_TRY(ov_buffer_read_later(context, &lists->totals, 0, lists->told, sizeof lists->told,
                                 &lists->later));
-    OV_TRY(make_lists(context, lists, &p));
+    if (!few)
+        OV_TRY(make_lists(context, lists, &p));
 cleanup:
     return status;
 }
@@ -285,13 +360,15 @@ ovoid_status ov_lists_end(ovoid_context *context, ov_lists *lists, bool *whole) 
 
 void ov_lists_destroy(ov_lists *lists) {
     ov_buffer *const buffers[] = {
-        &lists->term_start, &lists->term_item, &lists->pack_start, &lists->pack_item,
-        &lists->tally,      &lists->chain,     &lists->next,       &lists->entry_group,
-        &lists->entry_bits, &lists->place,     &lists->group_term, &lists->group_bits,
-        &lists->totals,
+        &lists->term_start,   &lists->term_item,    &lists->pack_start, &lists->pack_item,
+        &lists->tally,        &lists->chain,        &lists->next,       &lists->entry_group,
+        &lists->entry_bits,   &lists->place,        &lists->group_term, &lists->group_bits,
+        &lists->totals,       &lists->link,         &lists->few_term,   &lists->few_bits,
+        &lists->few_tally[0], &lists->few_tally[1],
     };
     ov_kernel *const kernels[] = {&lists->packs_of_terms, &lists->scan_lists,
-                                  &lists->hand_out_entries, &lists->lists_of_packs};
+                                  &lists->hand_out_entries, &lists->lists_of_packs,
+                                  &lists->make_few_lists};
     for (size_t k = 0; k < sizeof buffers / sizeof buffers[0]; ++k)
         ov_buffer_destroy(buffers[k]);
     for (size_t k = 0; k < sizeof kernels / sizeof kernels[0]; ++k)

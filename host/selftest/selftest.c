@@ -13,8 +13,8 @@
 static const ov_check checks[] = {
     {"layout", "layout", true, true, ov_check_layout},
     {"tree", "tree_leaves tree_level", true, true, ov_check_tree},
-    {"lists", "packs_of_terms scan_lists hand_out_entries lists_of_packs", true, true,
-     ov_check_lists},
+    {"lists", "packs_of_terms scan_lists hand_out_entries lists_of_packs make_few_lists", true,
+     true, ov_check_lists},
     {"field", "field field_polynomial field_gradient", true, false, ov_check_field},
     {"moments", "moments gram", true, false, ov_check_moments},
     {"misfit", "residual misfit", true, false, ov_check_misfit},

@@ -44,9 +44,9 @@ static void neighbours_come_together(void **state) {
     ov_adaptive f = {.context = context, .atoms = ATOMS, .capacity = COUNT};
     ov_trial t = trial_of(&f, &random, COUNT), before = trial_of(&f, &random, COUNT);
     ov_trial_copy(&t, &before);
-    f.refiner.now.listed_count = COUNT; /* it knows of the old order */
+    f.refiner.listing[0].listed_count = COUNT; /* it knows of the old order */
     test_check(context, ov_adaptive_sort(&f, &t));
-    assert_int_equal(f.refiner.now.listed_count, 0);
+    assert_int_equal(f.refiner.listing[0].listed_count, 0);
     assert_int_equal(t.count, COUNT);
     print_message("from the first to the last: %.0f angstrom, before %.0f\n", way_along(&t),
                   way_along(&before));
@@ -54,12 +54,12 @@ static void neighbours_come_together(void **state) {
     for (size_t k = 0; k < ATOMS; ++k)
         assert_memory_equal(t.x + t.owner[k] * (size_t)P, before.x + before.owner[k] * (size_t)P,
                             P * sizeof *t.x);
-    f.refiner.now.listed_count = COUNT;
+    f.refiner.listing[0].listed_count = COUNT;
     ov_trial again = trial_of(&f, &random, COUNT);
     ov_trial_copy(&t, &again);
     test_check(context, ov_adaptive_sort(&f, &again)); /* nothing to do */
     assert_memory_equal(again.x, t.x, COUNT * P * sizeof *t.x);
-    assert_int_equal(f.refiner.now.listed_count, COUNT);
+    assert_int_equal(f.refiner.listing[0].listed_count, COUNT);
     qsort(t.x, COUNT, P * sizeof *t.x, by_bytes);
     qsort(before.x, COUNT, P * sizeof *t.x, by_bytes);
     assert_memory_equal(t.x, before.x, COUNT * P * sizeof *t.x);

@@ -77,7 +77,7 @@ static double misfit_of(const scene *s, const double *x) {
 
 /* Whether the accepted model's lists hold every ellipsoid wherever it reaches the cut-off. */
 static void expect_covered(const ov_refiner *refiner, const scene *s, const double *x) {
-    const ov_lists *const lists = &refiner->now.lists;
+    const ov_lists *const lists = &refiner->listing[refiner->now.listing].lists;
     const size_t packs = s->samples.points.packs;
     uint32_t *const start = read_indices(s->context, &lists->pack_start, packs + 1);
     uint32_t *const item = read_indices(s->context, &lists->pack_item, lists->items);

@@ -132,9 +132,9 @@ static ovoid_status launch_losses(ov_refiner *r, ov_merger *m, const ov_target *
                      OV_ARG(target->points->xyz.memory),
                      OV_ARG(target->points->pack_origins.memory), OV_ARG(r->now.value.memory),
                      OV_ARG(target->low.memory), OV_ARG(target->high.memory),
-                     OV_ARG(target->weight.memory), OV_ARG(r->now.lists.term_start.memory),
-                     OV_ARG(r->now.lists.term_item.memory), OV_ARG(r->now.terms.device.memory),
-                     OV_ARG(m->loss.memory)));
+                     OV_ARG(target->weight.memory), OV_ARG(ov_refiner_lists(r)->term_start.memory),
+                     OV_ARG(ov_refiner_lists(r)->term_item.memory),
+                     OV_ARG(r->now.terms.device.memory), OV_ARG(m->loss.memory)));
 cleanup:
     return status;
 }
@@ -307,8 +307,8 @@ ovoid_status ov_misfit_shares(ov_refiner *r, ov_merger *m, const ov_target *targ
     if (!moments)
         return OVOID_ERROR_MEMORY;
     OV_TRY(upload_blame(r, m, target->points->packs * OV_PACK));
-    OV_TRY(ov_moments(r->context, &r->operations, target->points, &r->now.terms, &r->now.lists,
-                      &m->u, &m->moments));
+    OV_TRY(ov_moments(r->context, &r->operations, target->points, &r->now.terms,
+                      ov_refiner_lists(r), &m->u, &m->moments));
     OV_TRY(ov_buffer_read(r->context, &m->moments, 0, moments, count * sums * sizeof *moments));
     for (size_t i = 0; i < count; ++i)
         share[i] = (double)moments[i * sums] + moments[i * sums + 1];

@@ -18,63 +18,85 @@ static ovoid_status make_room(ov_refiner *r, size_t count) {
     return r->capacity ? OVOID_OK : OVOID_ERROR_MEMORY;
 }
 
-static double motion(const ov_evaluation *e, const double *x, size_t i) {
-    return ov_factor_motion(e->listed + i * OV_FACTOR_PARAMETERS, x + i * OV_FACTOR_PARAMETERS,
+static double motion(const ov_listing *l, const double *x, size_t i) {
+    return ov_factor_motion(l->listed + i * OV_FACTOR_PARAMETERS, x + i * OV_FACTOR_PARAMETERS,
                             ov_tuned.refine_cutoff);
 }
 
-static bool lists_cover(const ov_evaluation *e, const ov_points *points, const double *x,
+static bool is_of(const ov_listing *l, const ov_points *points, size_t count) {
+    return l->listed_points == points && l->listed_count == count;
+}
+
+static bool lists_cover(const ov_listing *l, const ov_points *points, const double *x,
                         size_t count) {
-    if (e->listed_points != points || e->listed_count != count)
+    if (!is_of(l, points, count))
         return false;
     for (size_t i = 0; i < count; ++i)
-        if (motion(e, x, i) > e->skins[i])
+        if (motion(l, x, i) > l->skins[i])
             return false;
     return true;
 }
 
-/* Those that move much get much room, so that few of them do not make all lists be built again. */
-static void choose_skins(ov_evaluation *e, const double *x, size_t count) {
+/* Those that moved much since the last lists get much room, so that few of them do not make all
+ * lists be built again. */
+static void choose_skins(const ov_listing *last, const ov_points *points, const double *x,
+                         size_t count, float *skins) {
+    const bool known = is_of(last, points, count);
     for (size_t i = 0; i < count; ++i)
-        e->skins[i] = e->listed_count == count
-                          ? (float)fmin(fmax(ov_tuned.refine_skin_growth * motion(e, x, i),
-                                             ov_tuned.refine_skin_min),
-                                        ov_tuned.refine_skin_max)
-                          : (float)ov_tuned.refine_skin;
+        skins[i] = known ? (float)fmin(fmax(ov_tuned.refine_skin_growth * motion(last, x, i),
+                                            ov_tuned.refine_skin_min),
+                                       ov_tuned.refine_skin_max)
+                         : (float)ov_tuned.refine_skin;
 }
 
 static ovoid_status set_terms(ov_refiner *r, ov_evaluation *e, const ov_points *points,
                               const double *x, size_t count) {
     for (size_t i = 0; i < count; ++i)
         ov_factor_quadric(x + i * OV_FACTOR_PARAMETERS, &r->quadrics[i]);
-    return ov_terms_set_skins(r->context, &e->terms, r->quadrics, e->skins, count, points->origin,
-                              ov_tuned.refine_cutoff);
+    return ov_terms_set_skins(r->context, &e->terms, r->quadrics, r->listing[e->listing].skins,
+                              count, points->origin, ov_tuned.refine_cutoff);
 }
 
-/* Sets the terms, and begins to build the lists again if they do not cover them any more: *begun.
- */
+/* Room for what the lists will be built for. */
+static ovoid_status begin_listing(ov_refiner *r, size_t place, const ov_points *points,
+                                  const double *x, size_t count) {
+    ovoid_status status = OVOID_OK;
+    ov_listing *const l = &r->listing[place];
+    const size_t size = count * OV_FACTOR_PARAMETERS;
+    OV_TRY(ov_grow(r->context, &l->skins, &l->skins_capacity, count, sizeof *l->skins, "skins"));
+    choose_skins(&r->listing[r->now.listing], points, x, count, l->skins);
+    l->listed_count = 0; /* until the lists are whole again */
+    OV_TRY(ov_grow(r->context, &l->listed, &l->listed_capacity, size, sizeof *x, "parameters"));
+    memcpy(l->listed, x, size * sizeof *x);
+    l->listed_points = points;
+cleanup:
+    return status;
+}
+
+/* Sets the terms, and begins to build lists if none cover them: *begun. */
 static ovoid_status place(ov_refiner *r, ov_evaluation *e, const ov_points *points, const double *x,
                           size_t count, bool *begun) {
     ovoid_status status = OVOID_OK;
-    const size_t size = count * OV_FACTOR_PARAMETERS;
-    const bool covered = lists_cover(e, points, x, count);
-    OV_TRY(ov_grow(r->context, &e->listed, &e->listed_capacity, size, sizeof *x, "parameters"));
-    OV_TRY(ov_grow(r->context, &e->skins, &e->skins_capacity, count, sizeof *e->skins, "skins"));
+    const size_t accepted = r->now.listing;
+    bool covered = false;
+    for (size_t k = 0; k < 2 && !covered; ++k) {
+        e->listing = k == 0 ? accepted : 1 - accepted;
+        covered = lists_cover(&r->listing[e->listing], points, x, count);
+    }
+    if (!covered && e == &r->now)
+        e->listing = accepted;
     if (!covered)
-        choose_skins(e, x, count);
-    if (!covered)
-        e->listed_count = 0; /* until the lists are whole again */
+        OV_TRY(begin_listing(r, e->listing, points, x, count));
     OV_TRY(set_terms(r, e, points, x, count));
     if (covered)
         return OVOID_OK;
-    *begun = ov_lists_built(&e->lists);
-    OV_TRY(*begun ? ov_lists_begin(r->context, &e->lists, points, &e->terms, 0.0)
-                  : ov_lists_build(r->context, &e->lists, points, &e->terms, 0.0));
-    memcpy(e->listed, x, size * sizeof *x);
-    e->listed_points = points;
+    ov_listing *const l = &r->listing[e->listing];
+    *begun = ov_lists_built(&l->lists);
+    OV_TRY(*begun ? ov_lists_begin(r->context, &l->lists, points, &e->terms, 0.0)
+                  : ov_lists_build(r->context, &l->lists, points, &e->terms, 0.0));
     ++r->list_builds;
     if (!*begun)
-        e->listed_count = count;
+        l->listed_count = count;
 cleanup:
     return status;
 }
@@ -105,42 +127,91 @@ cleanup:
     return status;
 }
 
-/* The misfit with the lists as they are. */
-static ovoid_status sum_misfit(ov_refiner *r, ov_evaluation *e, const ov_target *target,
-                               double *misfit) {
+/* Sums up the misfit with the lists as they are. */
+static ovoid_status launch_sums(ov_refiner *r, ov_evaluation *e, const ov_target *target) {
     ovoid_status status = OVOID_OK;
-    const size_t sums = sums_of(target->points);
-    OV_TRY(ov_field(r->context, &r->operations, target->points, &e->terms, &e->lists, &e->value));
+    OV_TRY(ov_field(r->context, &r->operations, target->points, &e->terms,
+                    &r->listing[e->listing].lists, &e->value));
     OV_TRY(launch_misfit(r, e, target));
-    OV_TRY(
-        ov_grow(r->context, &r->host, &r->host_capacity, sums, sizeof *r->host, "sums of packs"));
-    OV_TRY(ov_buffer_read(r->context, &e->sums, 0, r->host, sums * sizeof *r->host));
-    *misfit = 0.0;
-    for (size_t k = 0; k < sums; ++k)
-        *misfit += r->host[k];
 cleanup:
     return status;
+}
+
+/* later: without waiting for it. */
+static ovoid_status read_sums(ov_refiner *r, const ov_evaluation *e, const ov_target *target,
+                              bool later) {
+    ovoid_status status = OVOID_OK;
+    const size_t sums = sums_of(target->points), bytes = sums * sizeof *r->host;
+    OV_TRY(
+        ov_grow(r->context, &r->host, &r->host_capacity, sums, sizeof *r->host, "sums of packs"));
+    OV_TRY(later ? ov_buffer_read_later(r->context, &e->sums, 0, r->host, bytes, &r->sums)
+                 : ov_buffer_read(r->context, &e->sums, 0, r->host, bytes));
+cleanup:
+    return status;
+}
+
+static ovoid_status end_sums(ov_refiner *r, const ov_target *target, double *misfit) {
+    const size_t sums = sums_of(target->points);
+    const ovoid_status status = ov_later_end(r->context, &r->sums);
+    *misfit = 0.0;
+    for (size_t k = 0; k < sums && status == OVOID_OK; ++k)
+        *misfit += r->host[k];
+    return status;
+}
+
+/* Begins to evaluate, what read_sums() reads; *begun: with lists that may turn out to have had no
+ * room. end_evaluation() is to follow, after failures too. */
+static ovoid_status begin_evaluation(ov_refiner *r, ov_evaluation *e, const ov_target *target,
+                                     const double *x, size_t count, bool *begun) {
+    ovoid_status status = OVOID_OK;
+    *begun = false;
+    OV_TRY(make_room(r, count));
+    OV_TRY(place(r, e, target->points, x, count, begun));
+    OV_TRY(launch_sums(r, e, target));
+cleanup:
+    return status;
+}
+
+/* *whole: what was begun had room; otherwise it has been done again, and what was launched since is
+ * worth nothing. */
+static ovoid_status end_evaluation(ov_refiner *r, ov_evaluation *e, const ov_target *target,
+                                   bool begun, bool *whole, double *misfit) {
+    ovoid_status status = OVOID_OK;
+    ov_listing *const l = &r->listing[e->listing];
+    *whole = true;
+    OV_TRY(end_sums(r, target, misfit));
+    if (begun)
+        OV_TRY(ov_lists_end(r->context, &l->lists, whole));
+    if (!*whole) { /* there were more pairs than ever before */
+        OV_TRY(ov_lists_build(r->context, &l->lists, target->points, &e->terms, 0.0));
+        OV_TRY(launch_sums(r, e, target));
+        OV_TRY(read_sums(r, e, target, false));
+        OV_TRY(end_sums(r, target, misfit));
+    }
+    if (begun)
+        l->listed_count = e->terms.count;
+    ++r->evaluations;
+cleanup:
+    return status;
+}
+
+/* Waits for what is under way, which writes to the refiner's memory. */
+static void abandon(ov_refiner *r) {
+    ov_later_end(r->context, &r->sums);
+    for (size_t k = 0; k < 2; ++k)
+        ov_later_end(r->context, &r->listing[k].lists.later);
 }
 
 static ovoid_status evaluate(ov_refiner *r, ov_evaluation *e, const ov_target *target,
                              const double *x, size_t count, double *misfit) {
     ovoid_status status = OVOID_OK;
-    bool begun = false, whole = true;
-    OV_TRY(make_room(r, count));
-    OV_TRY(place(r, e, target->points, x, count, &begun));
-    OV_TRY(sum_misfit(r, e, target, misfit));
-    if (begun) {
-        OV_TRY(ov_lists_end(r->context, &e->lists, &whole));
-        if (!whole) { /* there were more pairs than ever before */
-            OV_TRY(ov_lists_build(r->context, &e->lists, target->points, &e->terms, 0.0));
-            OV_TRY(sum_misfit(r, e, target, misfit));
-        }
-        e->listed_count = count;
-    }
-    ++r->evaluations;
+    bool begun, whole;
+    OV_TRY(begin_evaluation(r, e, target, x, count, &begun));
+    OV_TRY(read_sums(r, e, target, false));
+    OV_TRY(end_evaluation(r, e, target, begun, &whole, misfit));
 cleanup:
-    if (begun && status != OVOID_OK)
-        ov_later_end(r->context, &e->lists.later);
+    if (status != OVOID_OK)
+        abandon(r);
     return status;
 }
 
@@ -191,20 +262,38 @@ static ovoid_status find_step(ov_refiner *r, const ov_target *target,
     ovoid_status status = OVOID_OK;
     const ov_system system = {.points = target->points,
                               .terms = &r->now.terms,
-                              .lists = &r->now.lists,
+                              .lists = ov_refiner_lists(r),
                               .weight = &r->now.active,
                               .moments = &r->moments,
                               .gram = &r->gram,
                               .parameters = x};
     if (fresh) {
-        OV_TRY(ov_moments(r->context, &r->operations, target->points, &r->now.terms, &r->now.lists,
+        OV_TRY(ov_moments(r->context, &r->operations, target->points, &r->now.terms, system.lists,
                           &r->now.u, &r->moments));
-        OV_TRY(ov_gram(r->context, &r->operations, target->points, &r->now.terms, &r->now.lists,
+        OV_TRY(ov_gram(r->context, &r->operations, target->points, &r->now.terms, system.lists,
                        &r->now.active, &r->gram));
     }
     OV_TRY(ov_solve(r->context, &r->solver, &r->operations, &system, damping, options->solver_steps,
                     options->solver_tolerance, r->step));
 cleanup:
+    return status;
+}
+
+/* The misfit where refining begins and the first step, in one round trip. */
+static ovoid_status find_first(ov_refiner *r, const ov_target *target,
+                               const ov_refine_options *options, const double *x, size_t count,
+                               double *misfit) {
+    ovoid_status status = OVOID_OK;
+    bool begun, whole;
+    OV_TRY(begin_evaluation(r, &r->now, target, x, count, &begun));
+    OV_TRY(read_sums(r, &r->now, target, true));
+    OV_TRY(find_step(r, target, options, x, options->damping, true));
+    OV_TRY(end_evaluation(r, &r->now, target, begun, &whole, misfit));
+    if (!whole)
+        OV_TRY(find_step(r, target, options, x, options->damping, true));
+cleanup:
+    if (status != OVOID_OK)
+        abandon(r);
     return status;
 }
 
@@ -215,10 +304,13 @@ ovoid_status ov_refine(ov_refiner *r, const ov_target *target, const ov_refine_o
     double damping = options->damping, tried;
     unsigned small = 0;
     bool fresh = true, failed = false; /* the last step */
-    OV_TRY(ov_refine_evaluate(r, target, x, count, misfit));
+    if (options->steps == 0)
+        return ov_refine_evaluate(r, target, x, count, misfit);
+    OV_TRY(find_first(r, target, options, x, count, misfit));
     for (uint32_t n = 1; n <= options->steps && small < 2 && damping < ov_tuned.refine_damping_max;
          ++n) {
-        OV_TRY(find_step(r, target, options, x, damping, fresh));
+        if (n > 1)
+            OV_TRY(find_step(r, target, options, x, damping, fresh));
         take_step(x, r->step, count, options->width_max, r->trial);
         status = evaluate(r, &r->tried, target, r->trial, count, &tried);
         if (status == OVOID_ERROR_NUMERIC) { /* too far out to be a model: as good as rejected */
@@ -253,31 +345,39 @@ cleanup:
 }
 
 void ov_refiner_forget(ov_refiner *r) {
-    r->now.listed_points = r->tried.listed_points = NULL;
-    r->now.listed_count = r->tried.listed_count = 0;
+    for (size_t k = 0; k < 2; ++k) {
+        r->listing[k].listed_points = NULL;
+        r->listing[k].listed_count = 0;
+    }
 }
 
 void ov_refiner_begin(ov_refiner *r) {
     ov_refiner_forget(r);
-    ov_lists_forget(&r->now.lists);
-    ov_lists_forget(&r->tried.lists);
+    r->now.listing = r->tried.listing = 0;
+    for (size_t k = 0; k < 2; ++k)
+        ov_lists_forget(&r->listing[k].lists);
     r->solver.last = 0;
 }
 
 static void destroy_evaluation(ov_evaluation *e) {
     ov_terms_destroy(&e->terms);
-    ov_lists_destroy(&e->lists);
     ov_buffer_destroy(&e->value);
     ov_buffer_destroy(&e->u);
     ov_buffer_destroy(&e->active);
     ov_buffer_destroy(&e->sums);
-    free(e->listed);
-    free(e->skins);
+}
+
+static void destroy_listing(ov_listing *l) {
+    ov_lists_destroy(&l->lists);
+    free(l->listed);
+    free(l->skins);
 }
 
 void ov_refiner_destroy(ov_refiner *r) {
     destroy_evaluation(&r->now);
     destroy_evaluation(&r->tried);
+    destroy_listing(&r->listing[0]);
+    destroy_listing(&r->listing[1]);
     ov_operations_destroy(&r->operations);
     ov_solver_destroy(&r->solver);
     ov_kernel_destroy(&r->misfit);

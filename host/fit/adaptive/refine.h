@@ -23,14 +23,19 @@ typedef struct ov_refine_options {
     void *where;
 } ov_refine_options;
 
-/* What one evaluation of a model leaves on the device. */
-typedef struct ov_evaluation {
-    ov_terms terms;
+/* Lists, and what they serve for. */
+typedef struct ov_listing {
     ov_lists lists;
     double *listed; /* parameters that the lists were built for */
     float *skins;   /* and how far each ellipsoid may move before they are built again (angstrom) */
     size_t listed_count, listed_capacity, skins_capacity;
     const ov_points *listed_points;
+} ov_listing;
+
+/* What one evaluation of a model leaves on the device. */
+typedef struct ov_evaluation {
+    ov_terms terms;
+    size_t listing;                   /* which of the refiner's its lists are */
     ov_buffer value, u, active, sums; /* see kernels/misfit.cl */
 } ov_evaluation;
 
@@ -40,12 +45,14 @@ typedef struct ov_refiner {
     ov_solver solver;
     ov_kernel misfit;
     ov_evaluation now, tried; /* of the accepted parameters, and of a step from there */
+    ov_listing listing[2];    /* those of the former, which the latter shares as long as they do */
     ov_buffer moments, gram;
     ov_quadric *quadrics;
     double *trial, *step;
     size_t capacity;
     float *host;
     size_t host_capacity;
+    ov_later sums; /* the read of a misfit's sums, while it is under way */
     uint64_t list_builds, evaluations, steps;
 } ov_refiner;
 
@@ -57,6 +64,10 @@ ovoid_status ov_refine(ov_refiner *refiner, const ov_target *target,
 /* The misfit at x; the model's values at the points stay in refiner->now. */
 ovoid_status ov_refine_evaluate(ov_refiner *refiner, const ov_target *target, const double *x,
                                 size_t count, double *misfit);
+/* The lists of refiner->now. */
+static inline ov_lists *ov_refiner_lists(ov_refiner *refiner) {
+    return &refiner->listing[refiner->now.listing].lists;
+}
 /* To be called when points that it has seen are replaced by others in the same place. */
 void ov_refiner_forget(ov_refiner *refiner);
 /* To be called before a search: what it launches then does not go with the one before. */

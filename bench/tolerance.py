@@ -7,7 +7,7 @@
 
 fits: default fits of molecules of all sizes, protonated or not, and what they deviate by when both
 surfaces are meshed at 0.2 Å. direct: the fewest ellipsoids with
-which --ellipsoids, a search by count, stays within 0.5 Å too; fewer than a fit found mean that it
+which --ellipsoids, a search by count, with effort 0, stays within 0.5 Å too; fewer than a fit found mean that it
 should have found them. settings: other tolerances, decay rates and isovalues.
 
 DIR has the molecules of the paper and some more; others come from Debian's apbs-data, pymol-data.
@@ -111,7 +111,7 @@ def by_count(ovoid, source, found, tolerance):
     `found` in steps of 2 %, and what they reach."""
     for percent in range(-12, 11, 2):
         count = round(found * (1 + percent / 100))
-        row = fit(ovoid, source, ["--ellipsoids", str(count)])
+        row = fit(ovoid, source, ["--ellipsoids", str(count), "--effort", "0"])
         if row["deviation"] is not None and row["deviation"] <= tolerance:
             return count, row["deviation"]
     return None, None

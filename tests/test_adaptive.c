@@ -55,6 +55,7 @@ static ovoid_fit_options options_of(ovoid_goal goal, double value) {
         options.spacing = 1.2;
         options.adaptive.mesh_spacing = 0.7; /* a finer lattice for small pieces takes longer */
         options.adaptive.steps = 6;
+        options.adaptive.effort = goal == OVOID_GOAL_TOLERANCE; /* sharpening launches no others */
     }
     return options;
 }

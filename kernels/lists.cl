@@ -522,28 +522,14 @@ __kernel void scan_lists(const uint terms_count, const uint groups, const uint4 
     tally[0] = 0;
 }
 
-/* Hands out the entries of every term. item: its packs in ascending order, from item[start[i]] on.
- * group_term, group_bits: the entries of each group of packs; place holds where each bin begins,
- * and afterwards ends, and the order within a bin depends on timing. start or place may be null:
- * nobody wants these lists. */
-#if !OV_BY_TEAM
-/* Lists the packs of a term from its entries, from item[to] on. */
-static inline void ov_list_term(const uint2 own, uint to, __global const uint *next,
-                                __global const uint *entry_group, __global const ushort *entry_bits,
-                                __global uint *item) {
-    uint chunk = own.x;
-    for (uint k = 0; k < own.y; ++k) {
-        if (k > 0 && k % OV_CHUNK == 0)
-            chunk = next[chunk];
-        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
-        for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
-            item[to++] = entry_group[at] * OV_GROUP + ov_lowest(bits);
-    }
-}
-#else
-static inline void ov_list_term(const uint2 own, uint to, const uint sharer, __local uint *scratch,
-                                __global const uint *next, __global const uint *entry_group,
-                                __global const ushort *entry_bits, __global uint *item) {
+/* Hands out the entries of a term, own.y of them from chunk own.x on: into the bins of their
+ * groups, unless place is null, and its packs to item[to] and on, unless item is. */
+#if OV_BY_TEAM
+static inline void ov_hand_out(const uint2 own, const uint index, const uint block, uint to,
+                               const uint sharer, __local uint *scratch, __global const uint *next,
+                               __global const uint *entry_group, __global const ushort *entry_bits,
+                               __global uint *item, __global uint *place, __global uint *group_term,
+                               __global ushort *group_bits) {
     uint chunk = own.x, reached = 0; /* the latter counts chunks along the chain */
     for (uint first = 0; first < own.y; first += OV_TEAM) {
         const uint entry = first + sharer;
@@ -555,14 +541,47 @@ static inline void ov_list_term(const uint2 own, uint to, const uint sharer, __l
             group = entry_group[at];
             bits = entry_bits[at];
         }
-        const uint2 packs = ov_sum_before(popcount(bits), sharer, scratch);
-        for (uint own_to = to + packs.x; bits != 0; bits &= bits - 1)
-            item[own_to++] = group * OV_GROUP + ov_lowest(bits);
-        to += packs.y;
+        if (place && bits != 0) {
+            const uint into = atomic_inc(&place[ov_bin(group, index, block)]);
+            group_term[into] = index;
+            group_bits[into] = (ushort)bits;
+        }
+        if (item) {
+            const uint2 packs = ov_sum_before(popcount(bits), sharer, scratch);
+            for (uint own_to = to + packs.x; bits != 0; bits &= bits - 1)
+                item[own_to++] = group * OV_GROUP + ov_lowest(bits);
+            to += packs.y;
+        }
+    }
+}
+#else
+static inline void ov_hand_out(const uint2 own, const uint index, const uint block, uint to,
+                               __global const uint *next, __global const uint *entry_group,
+                               __global const ushort *entry_bits, __global uint *item,
+                               __global uint *place, __global uint *group_term,
+                               __global ushort *group_bits) {
+    uint chunk = own.x;
+    for (uint k = 0; k < own.y; ++k) {
+        if (k > 0 && k % OV_CHUNK == 0)
+            chunk = next[chunk];
+        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
+        const uint group = entry_group[at];
+        if (place) {
+            const uint into = atomic_inc(&place[ov_bin(group, index, block)]);
+            group_term[into] = index;
+            group_bits[into] = entry_bits[at];
+        }
+        if (item)
+            for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
+                item[to++] = group * OV_GROUP + ov_lowest(bits);
     }
 }
 #endif
 
+/* Hands out the entries of every term. item: its packs in ascending order, from item[start[i]] on.
+ * group_term, group_bits: the entries of each group of packs; place holds where each bin begins,
+ * and afterwards ends, and the order within a bin depends on timing. start or place may be null:
+ * nobody wants these lists. */
 #if OV_BY_TEAM
 OV_LIST_KERNEL void
 hand_out_entries(const uint terms_count, const uint block, __global const uint2 *restrict chain,
@@ -572,32 +591,11 @@ hand_out_entries(const uint terms_count, const uint block, __global const uint2 
                  __global uint *restrict group_term, __global ushort *restrict group_bits,
                  __global const uint *restrict totals) {
     __local uint scratch[OV_TEAM];
-    const uint index = get_group_id(0), sharer = get_local_id(0);
+    const uint index = get_group_id(0);
     const uint entries = totals[4] != 0 ? chain[index].y : 0; /* all meet the barriers */
-    uint chunk = chain[index].x, reached = 0; /* the latter counts chunks along the chain */
-    uint to = start ? start[index] : 0;
-    for (uint first = 0; first < entries; first += OV_TEAM) {
-        const uint entry = first + sharer;
-        uint group = 0, bits = 0;
-        if (entry < entries) {
-            for (; reached < entry / OV_CHUNK; ++reached)
-                chunk = next[chunk];
-            const size_t at = (size_t)chunk * OV_CHUNK + entry % OV_CHUNK;
-            group = entry_group[at];
-            bits = entry_bits[at];
-        }
-        if (place && bits != 0) {
-            const uint own = atomic_inc(&place[ov_bin(group, index, block)]);
-            group_term[own] = index;
-            group_bits[own] = (ushort)bits;
-        }
-        if (start) {
-            const uint2 packs = ov_sum_before(popcount(bits), sharer, scratch);
-            for (uint own = to + packs.x; bits != 0; bits &= bits - 1)
-                item[own++] = group * OV_GROUP + ov_lowest(bits);
-            to += packs.y;
-        }
-    }
+    ov_hand_out((uint2)(chain[index].x, entries), index, block, start ? start[index] : 0,
+                get_local_id(0), scratch, next, entry_group, entry_bits, start ? item : 0, place,
+                group_term, group_bits);
 }
 #else
 __kernel void
@@ -610,23 +608,8 @@ hand_out_entries(const uint terms_count, const uint block, __global const uint2 
     const uint index = get_global_id(0);
     if (index >= terms_count || totals[4] == 0)
         return;
-    const uint entries = chain[index].y;
-    uint chunk = chain[index].x;
-    uint to = start ? start[index] : 0;
-    for (uint k = 0; k < entries; ++k) {
-        if (k > 0 && k % OV_CHUNK == 0)
-            chunk = next[chunk];
-        const size_t at = (size_t)chunk * OV_CHUNK + k % OV_CHUNK;
-        const uint group = entry_group[at];
-        if (place) {
-            const uint own = atomic_inc(&place[ov_bin(group, index, block)]);
-            group_term[own] = index;
-            group_bits[own] = entry_bits[at];
-        }
-        if (start)
-            for (uint bits = entry_bits[at]; bits != 0; bits &= bits - 1)
-                item[to++] = group * OV_GROUP + ov_lowest(bits);
-    }
+    ov_hand_out(chain[index], index, block, start ? start[index] : 0, next, entry_group, entry_bits,
+                start ? item : 0, place, group_term, group_bits);
 }
 #endif
 
@@ -775,8 +758,7 @@ __kernel void lists_of_packs(const uint groups, const uint packs,
 }
 #endif
 
-/* ---- few --------------------------------------------------------------------------------------
- */
+/* ---- few ------------------------------------------------------------------------------------- */
 
 /* What the numbers before number `index` come to, and in .y all of them. */
 static inline uint2 ov_sum_few(__global const uint *number, const uint count, const uint index) {
@@ -839,8 +821,8 @@ make_few_lists(const uint terms_count, const uint groups, const uint packs, cons
                   of_group ? packs : 0, sharer, scratch, group_term, group_bits, pack_start,
                   pack_item);
     const bool listed = !of_group && term_start && fits;
-    ov_list_term(listed ? chain[index] : (uint2)(0, 0), begin, sharer, scratch, next, entry_group,
-                 entry_bits, term_item);
+    ov_hand_out(listed ? chain[index] : (uint2)(0, 0), index, 1, begin, sharer, scratch, next,
+                entry_group, entry_bits, term_item, 0, group_term, group_bits);
     if (!of_group && term_start && sharer == 0) {
         term_start[index] = at;
         if (index == terms_count - 1)
@@ -896,7 +878,8 @@ __kernel void make_few_lists(const uint terms_count, const uint groups, const ui
         if (index == terms_count - 1)
             term_start[terms_count] = fits ? items : 0;
         if (fits)
-            ov_list_term(chain[index], begin, next, entry_group, entry_bits, term_item);
+            ov_hand_out(chain[index], index, 1, begin, next, entry_group, entry_bits, term_item, 0,
+                        group_term, group_bits);
     }
     for (uint k = place; k < used; k += groups + terms_count)
         spare[k] = 0;

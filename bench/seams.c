@@ -58,20 +58,11 @@ static void *allocate(size_t count, size_t size) {
 
 /* ---- where ----------------------------------------------------------------------------------- */
 
-static double distance_to(const ov_box *box, const double at[3]) {
-    double square = 0.0;
-    for (size_t k = 0; k < 3; ++k) {
-        const double off = fmax(fmax(box->low[k] - at[k], at[k] - box->high[k]), 0.0);
-        square += off * off;
-    }
-    return sqrt(square);
-}
-
 /* Within reach of the cells of two parts. */
 static int region_of(const ov_partition *cut, const double at[3]) {
     size_t near = 0;
     for (size_t p = 0; p < cut->count; ++p)
-        near += distance_to(&cut->part[p].cell, at) < NEAR;
+        near += ov_box_distance(&cut->part[p].cell, at) < NEAR;
     return near > 1 ? SEAM : ELSEWHERE;
 }
 

@@ -250,11 +250,11 @@ static ovoid_status reach_with_all(ovoid_fitter *fitter, const ovoid_fit_options
     if (!start && ov_parts_wanted(options, fitter->atoms))
         return ov_parts_reach(context, fitter->xyzr, fitter->atoms, &alone, options, began, ranks,
                               found, result);
-    if (!fitter->adaptive)
+    if (!fitter->adaptive) {
         OV_TRY(ov_need_check(context, &(ov_need){fitter->atoms, fitter->atoms, 1}));
-    if (!fitter->adaptive)
         OV_TRY(ov_adaptive_create(context, fitter->xyzr, fitter->atoms, NULL, !fitter->once,
                                   &fitter->adaptive));
+    }
     status = ov_adaptive_reach(fitter->adaptive, options, start, began, found, result);
 cleanup:
     return status;

@@ -266,15 +266,6 @@ static ovoid_status correct_all(job *j) {
 
 /* ---- what is far ----------------------------------------------------------------------------- */
 
-static double distance_to(const ov_box *box, const double at[3]) {
-    double square = 0.0;
-    for (size_t k = 0; k < 3; ++k) {
-        const double off = fmax(fmax(box->low[k] - at[k], at[k] - box->high[k]), 0.0);
-        square += off * off;
-    }
-    return sqrt(square);
-}
-
 /* Where nothing was within reach: as far as to one vertex of a piece. */
 static void bound_far(const job *j, ov_survey_far *far) {
     const size_t n = 1 - far->side;
@@ -284,7 +275,7 @@ static void bound_far(const job *j, ov_survey_far *far) {
             if (far->outer && !j->standing.outer[n][j->standing.first[n][c] + p])
                 continue;
             const ov_box place = {{at[0], at[1], at[2]}, {at[0], at[1], at[2]}};
-            far->distance = fmin(far->distance, distance_to(&place, far->at));
+            far->distance = fmin(far->distance, ov_box_distance(&place, far->at));
         }
 }
 
@@ -297,7 +288,7 @@ static bool may_be_near(const job *j, size_t c, size_t g, const ov_survey_far *f
     memcpy(at, far->at, sizeof far->at);
     if (g > 0)
         ov_rigid_move(&j->back[g], far->at, at);
-    return distance_to(&box, at) < far->distance;
+    return ov_box_distance(&box, at) < far->distance;
 }
 
 static ovoid_status add_search(const job *j, ov_survey_far *far, const double at[3], search *made) {

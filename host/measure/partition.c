@@ -137,6 +137,15 @@ bool ov_box_near(const ov_box *box, const double at[3], double distance) {
     return true;
 }
 
+double ov_box_distance(const ov_box *box, const double at[3]) {
+    double square = 0.0;
+    for (size_t k = 0; k < 3; ++k) {
+        const double off = fmax(fmax(box->low[k] - at[k], at[k] - box->high[k]), 0.0);
+        square += off * off;
+    }
+    return sqrt(square);
+}
+
 ov_box ov_box_move(const ov_box *box, const ov_rigid *rigid) {
     double middle[3], half[3], moved[3];
     ov_box made;

@@ -22,6 +22,9 @@ ov_box ov_box_move(const ov_box *box, const ov_rigid *rigid);
 /* Whether a point is no further from the box than that along each axis. */
 bool ov_box_near(const ov_box *box, const double at[3], double distance);
 
+/* How far a point is from the box, angstrom. */
+double ov_box_distance(const ov_box *box, const double at[3]);
+
 typedef struct ov_part {
     size_t first, count; /* of its atoms, in ov_partition.order */
     ov_box box;          /* of their centres */

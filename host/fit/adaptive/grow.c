@@ -141,7 +141,7 @@ ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing
                 .chosen = ov_alloc(f->context, f->capacity, sizeof *g.chosen, "ellipsoids"),
                 .felt = ov_alloc(f->context, f->capacity, sizeof *g.felt, "ellipsoids")};
     g.patience = how->patience;
-    g.in_order = how->in_order;
+    g.in_order = how->patience >= how->rounds; /* none is split */
     if (!g.before || !g.chosen || !g.felt) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;

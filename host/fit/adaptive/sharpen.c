@@ -6,8 +6,9 @@
 #include <math.h>
 
 static void multiply_amplitudes(ov_trial *t, double factor) {
+    const double more = log(factor);
     for (size_t i = 0; i < t->count; ++i)
-        t->x[i * OV_FACTOR_PARAMETERS + OV_FACTOR_AMPLITUDE] += log(factor);
+        t->x[i * OV_FACTOR_PARAMETERS + OV_FACTOR_AMPLITUDE] += more;
 }
 
 /* Judges a trial with the right volume, as the search will end with it: where the field is flat,
@@ -37,8 +38,7 @@ static ovoid_status exchange(ov_adaptive *f, double tolerance, ov_trial *t) {
                              .most = count + (size_t)more,
                              .rounds = ov_tuned.sharpen_rounds,
                              .patience =
-                                 frame ? ov_tuned.sharpen_rounds : ov_tuned.sharpen_patience,
-                             .in_order = frame};
+                                 frame ? ov_tuned.sharpen_rounds : ov_tuned.sharpen_patience};
     const ov_shrinking shrink = {.stage = "sharpen",
                                  .least = count,
                                  .idle_rounds = ov_tuned.sharpen_idle_rounds,

@@ -13,8 +13,8 @@ typedef struct ov_growing {
     const char *stage;
     size_t most; /* ellipsoids */
     uint32_t rounds;
-    uint32_t patience; /* a place is only refined, with more weight, when it is met so many times */
-    bool in_order;     /* ellipsoids keep their places in the model; only where none is split */
+    uint32_t patience; /* a place is only refined, with more weight, when it is met so many times;
+                          as many as rounds: ellipsoids keep their places in the model, too */
 } ov_growing;
 
 /* Whether the tolerance was seen to hold when the trial was judged last. */

@@ -79,7 +79,7 @@ SETTINGS = [["--tolerance", "0.2"], ["--tolerance", "0.3"], ["--tolerance", "1"]
             ["--isovalue", "0.5"], ["--isovalue", "2"]]
 SETTINGS_OF = ["1MAG", "FAS2", "1aki", "lys1", "1UBQ"]
 COLUMNS = ["molecule", "options", "atoms", "ellipsoids", "ratio", "reached", "deviation",
-           "area_error", "volume_error", "area_error_outer", "hausdorff_outer",
+           "deviation_bound", "area_error", "volume_error", "area_error_outer", "hausdorff_outer",
            "mean_distance_outer", "seconds", "deviation_finer", "direct", "direct_deviation"]
 FINER = 0.2  # angstrom: of the meshes that tell deviation_finer
 
@@ -96,7 +96,8 @@ def fit(ovoid, source, options, finely=False):
     row = {"atoms": report["atoms"], "ellipsoids": report["ellipsoids"],
            "ratio": report["sparse_ratio"], "options": " ".join(options),
            "reached": "yes" if report["goal"]["reached"] else "no",
-           "deviation": report["deviation"], "area_error": report["area"]["error"],
+           "deviation": report["deviation"], "deviation_bound": report["deviation_bound"],
+           "area_error": report["area"]["error"],
            "volume_error": report["volume"]["error"],
            "area_error_outer": report["area_outer"]["error"],
            "hausdorff_outer": report["hausdorff_outer"],

@@ -19,7 +19,8 @@ mutations() {
     cat <<'LIST'
 host/measure/distance.c|distance|chunks half as far as the best are skipped|s/box_distance(box, m->box) > most/box_distance(box, m->box) > 0.25 * most/
 host/measure/distance.c|distance|chunks nearly as far as the best are skipped|s/box_distance(box, m->box) > most/box_distance(box, m->box) > 0.8 * most/
-host/measure/bound.c|bound|a triangle reaches no farther than its corners|s|return farthest + longest_edge(p->at) / sqrt(3.0);|return farthest;|
+host/measure/bound.c|bound|a triangle reaches no farther than its corners|s|return farthest + sqrt(longest_edge(p->at) / 3.0);|return farthest;|
+host/measure/bound.c|bound|nothing inside triangles is beyond a limit|s/\*told = distance > b->limits->limit;/*told = false;/
 host/measure/bound.c|+bound|what is left over is forgotten|s/b->bound->most = fmax(b->bound->most, b->now.fragment\[n\].most);/;/
 kernels/distance.cl|bound|the nearest corner counts|s/max(farthest, ov_triangle_distances/min(farthest, ov_triangle_distances/
 host/fit/l1/l1.c|l1|no evaluation after a failed search|s/failures > 0) .*$/false)/

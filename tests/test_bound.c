@@ -108,15 +108,21 @@ static double largest_of(const ovoid_mesh *mesh, const float *distance) {
 }
 
 /* *of_vertices: the largest distance of an outer vertex. */
-static ov_bound bound_of(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
-                         double *of_vertices) {
+static ov_bound bound_from(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
+                           float *from_a, float *from_b, double *of_vertices) {
     ov_bound bound = {0};
     ovoid_distances distances;
-    float *const from_a = test_alloc(a->vertices, sizeof *from_a);
-    float *const from_b = test_alloc(b->vertices, sizeof *from_b);
     test_check(context,
                ov_mesh_distances(context, a, b, false, &distances, from_a, from_b, &bound));
     *of_vertices = fmax(largest_of(a, from_a), largest_of(b, from_b));
+    return bound;
+}
+
+static ov_bound bound_of(ovoid_context *context, const ovoid_mesh *a, const ovoid_mesh *b,
+                         double *of_vertices) {
+    float *const from_a = test_alloc(a->vertices, sizeof *from_a);
+    float *const from_b = test_alloc(b->vertices, sizeof *from_b);
+    const ov_bound bound = bound_from(context, a, b, from_a, from_b, of_vertices);
     free(from_a);
     free(from_b);
     return bound;
@@ -127,12 +133,84 @@ static double slack(double least, bool loose) {
                  : fmax(OV_BOUND_SLACK, OV_BOUND_SLACK_SHARE * least);
 }
 
+/* ---- what is beyond a limit --------------------------------------------------------------- */
+
+#define LIMIT_SLACK 2e-3
+
+/* Points that were told to be beyond a limit of a mesh. */
+typedef struct far_points {
+    const ovoid_mesh *to;
+    const ball *balls;
+    size_t *all; /* its triangles */
+    double limit;
+    size_t count;
+} far_points;
+
+static ovoid_status check_far(const double at[3], double distance, void *user) {
+    far_points *const far = user;
+    const double found = distance_of(at, far->to, far->balls, far->all, far->to->triangles);
+    expect_near(distance, found, 1e-5 + 1e-6 * found, "distance of a point beyond the limit");
+    assert_true(distance > far->limit);
+    ++far->count;
+    return OVOID_OK;
+}
+
+/* Counts points beyond the limit from the outer triangles of one mesh to another one. */
+static size_t count_far(ovoid_context *context, const ovoid_mesh *from, const ovoid_mesh *to,
+                        const float *distance, double limit, bool *whole) {
+    const double *const origin = corner_of(to, 0, 0);
+    ov_trail first = {0}, second = {0};
+    ov_facets facets = {0};
+    ov_meter meter = {0};
+    ball *const balls = test_alloc(to->triangles, sizeof *balls);
+    far_points far = {to, balls, test_alloc(to->triangles, sizeof *far.all), limit, 0};
+    const ov_limits limits = {limit, LIMIT_SLACK, check_far, &far};
+    for (size_t t = 0; t < to->triangles; ++t) {
+        balls[t] = ball_of(to, t);
+        far.all[t] = t;
+    }
+    test_check(context, ov_trail_create(context, from, false, &first));
+    test_check(context, ov_trail_create(context, to, false, &second));
+    test_check(context, ov_facets_set(context, &facets, &second, origin));
+    test_check(context,
+               ov_bound_exceed(context, &meter, &facets, &first, distance, &limits, whole));
+    ov_meter_destroy(&meter);
+    ov_facets_destroy(&facets);
+    ov_trail_destroy(&first);
+    ov_trail_destroy(&second);
+    free(far.all);
+    free(balls);
+    return far.count;
+}
+
+/* sampled: the largest distance that was found in the triangles of `from`. */
+static void expect_limits(ovoid_context *context, const ovoid_mesh *from, const ovoid_mesh *to,
+                          float *distance, double sampled) {
+    double largest = largest_of(from, distance);
+    bool whole;
+    for (size_t v = 0; v < from->vertices; ++v) /* the others do not count */
+        distance[v] = ov_mesh_is_exposed(from, v) ? distance[v] : -1.0f;
+    largest += 1e-5 + 1e-6 * largest;
+    const size_t beyond = count_far(context, from, to, distance, largest, &whole);
+    if (beyond == 0 && whole && sampled > largest + LIMIT_SLACK)
+        fail_msg("nothing is said to be beyond %.9g, and %.9g is", largest, sampled);
+    assert_int_equal(count_far(context, from, to, distance, 1.5 * largest + 2.0 * sampled, &whole),
+                     0);
+    assert_true(whole);
+    for (size_t v = 0; v < from->vertices; ++v)
+        distance[v] = -1.0f;
+    assert_int_equal(count_far(context, from, to, distance, 0.0, &whole), 0);
+    assert_true(whole);
+}
+
 /* What all bounds keep to; destroys the meshes. Returns how much the bound is above the vertices.
  */
 static double expect_bound(ovoid_context *context, ovoid_mesh *a, ovoid_mesh *b, const char *what,
                            size_t number) {
     double of_vertices, pitch[2];
-    const ov_bound got = bound_of(context, a, b, &of_vertices);
+    float *const from_a = test_alloc(a->vertices, sizeof *from_a);
+    float *const from_b = test_alloc(b->vertices, sizeof *from_b);
+    const ov_bound got = bound_from(context, a, b, from_a, from_b, &of_vertices);
     const double forward = sample(a, b, &pitch[0]), backward = sample(b, a, &pitch[1]),
                  found = fmax(forward, backward), rounding = 1e-5 + 1e-6 * found;
     if (!(got.most >= found))
@@ -144,6 +222,10 @@ static double expect_bound(ovoid_context *context, ovoid_mesh *a, ovoid_mesh *b,
                  got.least, of_vertices, found);
     if (!(got.most <= got.least + slack(got.least, false) + rounding))
         fail_msg("%s %zu: from %.9g to %.9g", what, number, got.least, got.most);
+    expect_limits(context, a, b, from_a, forward);
+    expect_limits(context, b, a, from_b, backward);
+    free(from_a);
+    free(from_b);
     ovoid_mesh_destroy(&a);
     ovoid_mesh_destroy(&b);
     return got.most / fmax(of_vertices, 1e-9);

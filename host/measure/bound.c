@@ -34,6 +34,7 @@ typedef struct bounding {
     ov_meter *meter;
     ov_facets *facets;
     ov_bound *bound;
+    const ov_limits *limits; /* NULL: the largest distance itself is looked for */
     fragments now, next;
     double margin; /* what rounding may take from a distance, its own share of it aside */
     bool loose;    /* more slack is left */
@@ -48,14 +49,23 @@ static void bounding_destroy(bounding *b) {
     free(b->squared);
 }
 
-static double length_between(const double a[3], const double b[3]) {
-    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    return sqrt(x * x + y * y + z * z);
+/* In loops over triangles. */
+static ovoid_status ask(ovoid_context *context, const bounding *b, size_t turn, size_t total) {
+    if (!b->meter->watch)
+        return ov_progress_turn(context, turn, total);
+    return turn % OV_PROGRESS_TURNS == 0 ? ov_watch_ask(context, b->meter->watch) : OVOID_OK;
 }
 
+static double square_between(const double a[3], const double b[3]) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
+}
+
+/* Squared. */
 static double longest_edge(const double at[3][3]) {
-    return fmax(length_between(at[0], at[1]),
-                fmax(length_between(at[1], at[2]), length_between(at[2], at[0])));
+    const double a = square_between(at[0], at[1]), b = square_between(at[1], at[2]),
+                 c = square_between(at[2], at[0]);
+    return a > b ? (a > c ? a : c) : (b > c ? b : c);
 }
 
 static double no_less(const bounding *b, float squared) {
@@ -64,6 +74,8 @@ static double no_less(const bounding *b, float squared) {
 
 /* What does not reach farther is done with. */
 static double enough(const bounding *b) {
+    if (b->limits)
+        return b->limits->limit + b->limits->slack;
     const double least = b->bound->least,
                  slack = b->loose ? fmax(OV_BOUND_SLACK_LOOSE, OV_BOUND_SLACK_SHARE_LOOSE * least)
                                   : fmax(OV_BOUND_SLACK, OV_BOUND_SLACK_SHARE * least);
@@ -82,17 +94,20 @@ static void corners_of(const bounding *b, const ov_trail *trail, size_t k, doubl
 
 /* Adds what rounding may do because of a surface. */
 static ovoid_status find_margin(ovoid_context *context, const ov_trail *trail, bounding *b) {
-    double largest = 0.0, longest = 0.0, at[3][3];
+    double largest = 0.0, longest = 0.0, at[3][3]; /* longest: squared */
     for (size_t k = 0; k < trail->triangles; ++k) {
-        const ovoid_status asked = ov_progress_turn(context, k, trail->triangles);
+        const ovoid_status asked = ask(context, b, k, trail->triangles);
         if (asked != OVOID_OK)
             return asked;
         corners_of(b, trail, k, at);
-        for (size_t i = 0; i < 9; ++i)
-            largest = fmax(largest, fabs(at[i / 3][i % 3]));
-        longest = fmax(longest, longest_edge((const double(*)[3])at));
+        for (size_t i = 0; i < 9; ++i) {
+            const double size = fabs(at[i / 3][i % 3]);
+            largest = size > largest ? size : largest;
+        }
+        const double edge = longest_edge((const double(*)[3])at);
+        longest = edge > longest ? edge : longest;
     }
-    b->margin += CORNER_ROUNDING * largest + ROUNDING * longest;
+    b->margin += CORNER_ROUNDING * largest + ROUNDING * sqrt(longest);
     return OVOID_OK;
 }
 
@@ -101,7 +116,7 @@ static ovoid_status find_margin(ovoid_context *context, const ov_trail *trail, b
  * sum of w_i w_j |edge_ij|^2 over the edges, and that is at most a third of the longest edge's. */
 static double most_by_corners(const fragment *p) {
     const double farthest = fmax(p->distance[0], fmax(p->distance[1], p->distance[2]));
-    return farthest + longest_edge(p->at) / sqrt(3.0);
+    return farthest + sqrt(longest_edge(p->at) / 3.0);
 }
 
 /* Keeps a fragment unless it is done with. */
@@ -140,7 +155,7 @@ static ovoid_status know_corners(ovoid_context *context, bounding *b, const ov_t
                                  const float *squared) {
     for (size_t k = 0; k < from->triangles; ++k) {
         float of[3];
-        const ovoid_status asked = ov_progress_turn(context, k, from->triangles);
+        const ovoid_status asked = ask(context, b, k, from->triangles);
         if (asked != OVOID_OK)
             return asked;
         squared_of(from, k, squared, of);
@@ -157,7 +172,7 @@ static ovoid_status collect(ovoid_context *context, bounding *b, const ov_trail 
     for (; *k < from->triangles && b->now.count < PIECE; ++*k) {
         fragment p;
         float of[3];
-        OV_TRY(ov_progress_turn(context, *k, from->triangles));
+        OV_TRY(ask(context, b, *k, from->triangles));
         if (!is_exposed(from, *k))
             continue;
         squared_of(from, *k, squared, of);
@@ -210,7 +225,7 @@ cleanup:
     return status;
 }
 
-/* The middles of edges, each beside the corner opposite: their distances, and what they raise. */
+/* The middles of edges, each beside the corner opposite, and their distances. */
 static ovoid_status measure_middles(ovoid_context *context, bounding *b) {
     ovoid_status status = OVOID_OK;
     const size_t count = b->now.count;
@@ -223,7 +238,6 @@ static ovoid_status measure_middles(ovoid_context *context, bounding *b) {
                     (float)(0.5 * (p->at[(i + 1) % 3][k] + p->at[(i + 2) % 3][k]));
     }
     OV_TRY(ov_facets_distances(context, b->meter, b->facets, &sites, b->squared));
-    raise_least(b, b->squared, sites.count);
 cleanup:
     return status;
 }
@@ -251,13 +265,36 @@ cleanup:
     return status;
 }
 
+/* Tells of the farthest of a fragment's middles if it is beyond the limit: *told. */
+static ovoid_status tell_far(const bounding *b, const fragment *p, const float squared[3],
+                             bool *told) {
+    const size_t i = squared[1] > squared[0] ? (squared[2] > squared[1] ? 2 : 1)
+                                             : (squared[2] > squared[0] ? 2 : 0);
+    const double distance = sqrt((double)squared[i]);
+    double at[3];
+    *told = distance > b->limits->limit;
+    if (!*told)
+        return OVOID_OK;
+    for (size_t k = 0; k < 3; ++k)
+        at[k] = b->facets->origin[k] + 0.5 * (p->at[(i + 1) % 3][k] + p->at[(i + 2) % 3][k]);
+    return b->limits->found(at, distance, b->limits->user);
+}
+
 static ovoid_status split_all(ovoid_context *context, bounding *b) {
     ovoid_status status = OVOID_OK;
     b->next.count = 0;
     OV_TRY(make_room(context, b, 9 * b->now.count, 3 * b->now.count));
     OV_TRY(measure_middles(context, b));
-    for (size_t n = 0; n < b->now.count; ++n)
-        OV_TRY(split(context, b, &b->now.fragment[n], b->squared + 3 * n));
+    if (!b->limits)
+        raise_least(b, b->squared, 3 * b->now.count);
+    for (size_t n = 0; n < b->now.count; ++n) {
+        const fragment *const p = &b->now.fragment[n];
+        bool told = false;
+        if (b->limits)
+            OV_TRY(tell_far(b, p, b->squared + 3 * n, &told));
+        if (!told)
+            OV_TRY(split(context, b, p, b->squared + 3 * n));
+    }
     b->bound->split += b->now.count;
     const fragments done = b->now;
     b->now = b->next;
@@ -298,6 +335,57 @@ ovoid_status ov_bound_add(ovoid_context *context, ov_meter *meter, ov_facets *fa
         OV_TRY(bound_piece(context, &b));
     }
     bound->most = fmax(bound->most, bound->least);
+cleanup:
+    bounding_destroy(&b);
+    return status;
+}
+
+/* ---- what is beyond a limit -------------------------------------------------------------------
+ */
+
+/* Whether a triangle is looked at; its corners' distances. */
+static bool is_within(const bounding *b, const ov_trail *from, size_t k, const float *distance,
+                      double of[3]) {
+    const uint32_t *const corner = from->mesh->corners + 3 * (size_t)ov_trail_triangle(from, k);
+    for (size_t i = 0; i < 3; ++i) {
+        of[i] = (double)distance[corner[i]];
+        if (of[i] < 0.0 || of[i] > b->limits->limit)
+            return false;
+        of[i] += of[i] * ROUNDING + b->margin;
+    }
+    return true;
+}
+
+/* As collect(). */
+static ovoid_status collect_within(ovoid_context *context, bounding *b, const ov_trail *from,
+                                   const float *distance, size_t *k) {
+    ovoid_status status = OVOID_OK;
+    for (; *k < from->triangles && b->now.count < PIECE; ++*k) {
+        fragment p;
+        OV_TRY(ask(context, b, *k, from->triangles));
+        if (!is_within(b, from, *k, distance, p.distance))
+            continue;
+        corners_of(b, from, *k, p.at);
+        p.most = most_by_corners(&p);
+        OV_TRY(keep(context, b, &b->now, &p));
+    }
+cleanup:
+    return status;
+}
+
+ovoid_status ov_bound_exceed(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                             const ov_trail *from, const float *distance, const ov_limits *limits,
+                             bool *whole) {
+    ovoid_status status = OVOID_OK;
+    ov_bound bound = {0};
+    bounding b = {.meter = meter, .facets = facets, .bound = &bound, .limits = limits};
+    OV_TRY(find_margin(context, from, &b));
+    OV_TRY(find_margin(context, &facets->trail, &b));
+    for (size_t k = 0; k < from->triangles;) {
+        OV_TRY(collect_within(context, &b, from, distance, &k));
+        OV_TRY(bound_piece(context, &b));
+    }
+    *whole = bound.most <= limits->limit + limits->slack;
 cleanup:
     bounding_destroy(&b);
     return status;

@@ -1,4 +1,6 @@
 #include "measure/judge.h"
+
+#include "measure/bound.h"
 #include "model/factor.h"
 #include "neighbours/neighbours.h"
 
@@ -10,8 +12,11 @@
  * area's relative error (angstrom). */
 #define SCORE_WHOLE 0.1
 #define SCORE_AREA 10.0
-/* Where spots are looked for, distances below this share of theirs are only bounded. */
+/* Where spots are looked for, distances below this share of theirs are only bounded; inside
+ * triangles, too, those that leave so much to `least`, in lattice steps: what a triangle reaches
+ * beyond its corners, most often. */
 #define ENOUGH 0.8
+#define ENOUGH_INSIDE 0.7
 
 /* The light mesh of some bodies, with normals where its area and its volume are wanted; its
  * components are still to be found. *mesh is NULL where there is no surface. */
@@ -224,12 +229,17 @@ static void judge_distances(const ov_judge *judge, const ovoid_mesh *mesh, const
 /* A model's mesh, and how far its vertices and those of the original are from the other surface. */
 typedef struct trial {
     ovoid_mesh *mesh;
+    ov_trail trail;                    /* of the mesh */
     float *from_original, *from_model; /* NULL where there are no two outer surfaces */
+    ov_spot *inside;                   /* spots that are no vertices */
+    size_t inside_count, inside_room;
 } trial;
 
 static void trial_destroy(trial *t) {
     free(t->from_original);
     free(t->from_model);
+    free(t->inside);
+    ov_trail_destroy(&t->trail);
     ovoid_mesh_destroy(&t->mesh);
 }
 
@@ -251,7 +261,6 @@ cleanup:
  * the host finds out what else there is to know of the model's. */
 static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t, ov_content *content) {
     ovoid_status status = OVOID_OK;
-    ov_trail trail = {0};
     ovoid_context *const context = judge->context;
     t->from_original =
         ov_alloc(context, judge->mesh->vertices, sizeof *t->from_original, "distances");
@@ -263,8 +272,8 @@ static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t, ov_c
     OV_TRY(lay_original(judge));
     judge->meter.watch = judge->back.watch = &judge->watch;
     judge->meter.enough = judge->back.enough = enough;
-    OV_TRY(ov_trail_create(context, t->mesh, false, &trail));
-    OV_TRY(ov_facets_set(context, &judge->other, &trail, judge->origin));
+    OV_TRY(ov_trail_create(context, t->mesh, false, &t->trail));
+    OV_TRY(ov_facets_set(context, &judge->other, &t->trail, judge->origin));
     OV_TRY(ov_vertex_distances_begin(context, &judge->meter, &judge->other, &judge->facets,
                                      t->from_original));
     OV_TRY(ov_vertex_distances_begin(context, &judge->back, &judge->facets, &judge->other,
@@ -275,7 +284,6 @@ static ovoid_status measure_trial(ov_judge *judge, double enough, trial *t, ov_c
 cleanup:
     ov_later_end(context, &judge->meter.later); /* what is under way writes to the trial */
     ov_later_end(context, &judge->back.later);
-    ov_trail_destroy(&trail);
     return status;
 }
 
@@ -299,10 +307,67 @@ cleanup:
     return status;
 }
 
+/* ---- spots ---------------------------------------------------------------------------------- */
+
+/* Whose spots are looked for. */
+typedef struct looking {
+    const ov_judge *judge;
+    trial *t;
+} looking;
+
+static ovoid_status add_inside(const double at[3], double distance, void *user) {
+    const looking *const l = user;
+    trial *const t = l->t;
+    const ovoid_status status = ov_grow(l->judge->context, (void *)&t->inside, &t->inside_room,
+                                        t->inside_count + 1, sizeof *t->inside, "spots");
+    if (status == OVOID_OK)
+        t->inside[t->inside_count++] = (ov_spot){.at = {at[0], at[1], at[2]}, .distance = distance};
+    return status;
+}
+
+/* Spots inside the triangles of one of the meshes; those with corners that do not count do not. */
+static ovoid_status look_inside(const ov_judge *judge, ov_meter *meter, ov_facets *to,
+                                const ov_trail *from, const float *distance, double least,
+                                trial *t) {
+    looking l = {judge, t};
+    const ov_limits limits = {
+        .limit = least, .slack = judge->slack, .found = add_inside, .user = &l};
+    bool whole, outer;
+    float *const counted =
+        ov_alloc(judge->context, from->mesh->vertices, sizeof *counted, "distances");
+    if (!counted)
+        return OVOID_ERROR_MEMORY;
+    for (size_t v = 0; v < from->mesh->vertices; ++v)
+        counted[v] = counts(judge, from->mesh, v, &outer) && outer ? distance[v] : -1.0f;
+    const ovoid_status status =
+        ov_bound_exceed(judge->context, meter, to, from, counted, &limits, &whole);
+    free(counted);
+    return status;
+}
+
+/* In both directions. */
+static ovoid_status look_inside_both(ov_judge *judge, double least, trial *t,
+                                     ov_judgement *judgement) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(look_inside(judge, &judge->meter, &judge->other, &judge->trail, t->from_original, least,
+                       t));
+    OV_TRY(look_inside(judge, &judge->back, &judge->facets, &t->trail, t->from_model, least, t));
+    for (size_t n = 0; n < t->inside_count; ++n)
+        judgement->deviation = fmax(judgement->deviation, t->inside[n].distance);
+    judgement->hausdorff = fmax(judgement->hausdorff, judgement->deviation);
+cleanup:
+    return status;
+}
+
+static double enough_of(const ov_judge *judge, double least) {
+    const double inside = least - ENOUGH_INSIDE * judge->meshing.spacing;
+    return judge->slack > 0.0 ? fmax(inside, 0.0) : ENOUGH * least;
+}
+
 /* *spots: of the trial's surfaces; free with free(). */
 static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least, double apart,
                                   size_t most, ov_spot **spots, size_t *spot_count) {
-    size_t room = 0;
+    size_t room = t->inside_count;
     *spot_count = 0;
     add_spots(judge, judge->mesh, t->from_original, least, NULL, &room);
     add_spots(judge, t->mesh, t->from_model, least, NULL, &room);
@@ -311,6 +376,8 @@ static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least,
         return OVOID_ERROR_MEMORY;
     add_spots(judge, judge->mesh, t->from_original, least, *spots, spot_count);
     add_spots(judge, t->mesh, t->from_model, least, *spots, spot_count);
+    for (size_t n = 0; n < t->inside_count; ++n)
+        (*spots)[(*spot_count)++] = t->inside[n];
     return ov_spots_thin(judge->context, *spots, spot_count, apart, most);
 }
 
@@ -321,7 +388,9 @@ ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t 
     trial t = {0};
     *spots = NULL;
     *spot_count = 0;
-    OV_TRY(try_model(judge, quadrics, count, ENOUGH * least, &t, NULL, judgement));
+    OV_TRY(try_model(judge, quadrics, count, enough_of(judge, least), &t, NULL, judgement));
+    if (judgement->valid && judge->slack > 0.0)
+        OV_TRY(look_inside_both(judge, least, &t, judgement));
     if (judgement->valid)
         OV_TRY(collect_spots(judge, &t, least, apart, most, spots, spot_count));
 cleanup:

@@ -38,6 +38,7 @@ typedef struct ov_judge {
     ov_facets facets;       /* of the original, */
     bool laid;              /* once these are there */
     ov_facets other;        /* of the model at hand */
+    double slack;           /* set by the owner, see ov_judge_spots() */
     bool whole;             /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;         /* set by the owner: only the surfaces within this box count, and not */
     double low[3], high[3]; /* their areas: beyond it they may be cut off */
@@ -69,7 +70,10 @@ ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t 
 
 /* The *spot_count places where the deviation is at least `least`, largest first, none nearer to
  * another than `apart`, at most `most`. *spots is to be freed. Of the judgement hausdorff and
- * deviation are filled in, exact where they are not much below `least`, else only bounds. */
+ * deviation are filled in, exact where they are not much below `least`, else only bounds. Of
+ * vertices alone, unless the judge's slack (angstrom) is above 0: then points inside triangles are
+ * looked for, too, and where none is found no point of the outer meshes is farther than `least` and
+ * the slack, unless the meshes are too coarse to tell that of so small a distance. */
 ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
                             double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
                             size_t *spot_count);

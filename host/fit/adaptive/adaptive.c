@@ -1,4 +1,4 @@
-#include "fit/adaptive/search.h"
+#include "fit/adaptive/tolerance.h"
 
 #include "base/progress.h"
 
@@ -222,10 +222,12 @@ cleanup:
 }
 
 /* Makes the volumes equal by a factor of all amplitudes, unless that loses the tolerance. */
-static ovoid_status calibrate(ov_adaptive *f, size_t count, ov_judgement *judgement) {
+static ovoid_status calibrate(ov_adaptive *f, size_t count, ov_judgement *judgement,
+                              bool *changed) {
     ovoid_status status = OVOID_OK;
     const ovoid_adaptive_options *const wanted = &f->options->adaptive;
     double per_log = 0.0;
+    *changed = false;
     OV_TRY(judge_volume(f, count, judgement));
     for (uint32_t n = 0; n < ov_tuned.volume_steps && judgement->valid && wanted->steps > 0 &&
                          fabs(judgement->volume_ratio - 1.0) > ov_tuned.volume_error;
@@ -238,10 +240,12 @@ static ovoid_status calibrate(ov_adaptive *f, size_t count, ov_judgement *judgem
         const bool lost = wanted->goal == OVOID_GOAL_TOLERANCE &&
                           after.deviation > wanted->tolerance &&
                           judgement->deviation <= wanted->tolerance;
-        if (!lost && fabs(after.volume_ratio - 1.0) < fabs(judgement->volume_ratio - 1.0))
+        if (!lost && fabs(after.volume_ratio - 1.0) < fabs(judgement->volume_ratio - 1.0)) {
             *judgement = after;
-        else
+            *changed = true;
+        } else {
             multiply_amplitudes(f, count, exp(-step)); /* too far */
+        }
         if (lost)
             break;
     }
@@ -313,28 +317,37 @@ static void tell(const ov_adaptive *f, size_t count, const ov_judgement *judgeme
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
 
-/* What was confirmed at a finer spacing may be lost by making the volumes equal, and is then as it
- * was. */
+/* What a model is held to that had its volume made equal. */
+static double tolerance_of(const ov_adaptive *f) {
+    return (1.0 - 0.5 * ov_adaptive_margin(f)) * f->options->adaptive.tolerance;
+}
+
+/* What was confirmed may be lost by making the volumes equal, and is then as it was. */
 static ovoid_status keep_confirmed(ov_adaptive *f, const ov_trial *best, ov_judgement *judgement) {
-    const double tolerance = f->options->adaptive.tolerance;
-    const size_t count = ov_adaptive_surround(f, best->count);
-    ov_judgement finely;
-    ov_spot *spots = NULL;
-    size_t found;
-    const ovoid_status status =
-        ov_judge_spots(&f->fine, f->quadrics, count, tolerance, 0.0, 1, &finely, &spots, &found);
-    free(spots);
-    if (status != OVOID_OK)
-        return status;
-    const bool holds = finely.valid && finely.deviation <= tolerance;
+    ovoid_status status = OVOID_OK;
+    const double tolerance = tolerance_of(f);
+    ov_judge *const judges[2] = {&f->judge, &f->fine};
+    bool holds = true;
+    for (size_t n = 0; n < (f->finely ? 2 : 1) && holds; ++n) {
+        const size_t count = ov_adaptive_surround(f, best->count);
+        ov_judgement closely;
+        ov_spot *spots = NULL;
+        size_t found;
+        OV_TRY(ov_judge_spots(judges[n], f->quadrics, count, tolerance, 0.0, 1, &closely, &spots,
+                              &found));
+        free(spots);
+        holds = closely.valid && closely.deviation <= tolerance;
+        if (!holds && best->judgement.deviation > tolerance) {
+            judgement->valid = judgement->valid && closely.valid;
+            judgement->deviation = fmax(judgement->deviation, closely.deviation);
+        }
+    }
     if (!holds && best->judgement.deviation <= tolerance) {
         ov_adaptive_quadrics(f, best);
         *judgement = best->judgement;
-    } else if (!holds) {
-        judgement->valid = judgement->valid && finely.valid;
-        judgement->deviation = fmax(judgement->deviation, finely.deviation);
     }
-    return OVOID_OK;
+cleanup:
+    return status;
 }
 
 /* The last judgement, with the volumes made equal. */
@@ -342,10 +355,17 @@ static ovoid_status finish(ov_adaptive *f, const ov_trial *best, ov_found *found
                            ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_judgement judgement;
+    const double tolerance = tolerance_of(f);
+    bool changed;
     ov_adaptive_quadrics(f, best);
-    OV_TRY(calibrate(f, best->count, &judgement));
-    if (f->finely)
+    OV_TRY(calibrate(f, best->count, &judgement, &changed));
+    const bool confirmed = f->finely || f->judge.slack > 0.0;
+    if (confirmed && changed) {
         OV_TRY(keep_confirmed(f, best, &judgement));
+    } else if (confirmed && !ov_trial_holds(best, tolerance)) { /* looked at closely */
+        judgement.valid = judgement.valid && best->judgement.valid;
+        judgement.deviation = fmax(judgement.deviation, best->judgement.deviation);
+    }
     OV_TRY(hand_over(f, best, found));
     tell(f, best->count, &judgement, result);
 cleanup:
@@ -439,6 +459,7 @@ static void begin_search(ov_adaptive *f, const ovoid_fit_options *options, const
     f->start = start;
     f->fewest = 0;
     f->finely = false;
+    f->judge.slack = 0.0;
     f->held = NULL;
     f->steps = 0;
     f->misfit = 0.0;

@@ -297,8 +297,11 @@ static void choose_share(shrinking *s, size_t tries, size_t held) {
 /* Whether the last rounds were worth their while: too little was gained in a few of them and in
  * enough tries, which in a small molecule take more rounds. */
 static bool is_idle(shrinking *s, const ov_shrinking *how, size_t tries, size_t count) {
-    ++s->idle_rounds;
-    s->idle_tries += tries;
+    if (!how->thorough || s->share <= ov_tuned.shrink_share_min ||
+        tries <= ov_tuned.shrink_tries_min) {
+        ++s->idle_rounds;
+        s->idle_tries += tries;
+    }
     if ((double)count <= (1.0 - ov_tuned.shrink_gain) * (double)s->milestone) {
         s->milestone = count;
         s->idle_rounds = 0;
@@ -328,8 +331,8 @@ ovoid_status ov_adaptive_shrink(ov_adaptive *f, double tolerance, const ov_shrin
         OV_TRY(settle(f, tolerance, best, &s));
         if (s.next.count < before + (s.how.chances > 0) && ov_trial_holds(&s.next, tolerance))
             ov_trial_swap(&s.next, best);
-        choose_share(&s, tries, before - best->count);
         idle = is_idle(&s, how, tries, best->count);
+        choose_share(&s, tries, before - best->count);
     }
 cleanup:
     shrinking_destroy(&s);

@@ -104,6 +104,7 @@ static ovoid_status shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
     const double slack = 1.0 + ov_tuned.motion_slack;
     const ov_shrinking how = {.stage = "shrink",
                               .least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
+                              .thorough = !frame && !part,
                               .idle_rounds = effort * (frame  ? ov_tuned.motion_idle_rounds
                                                        : part ? ov_tuned.shrink_part_idle_rounds
                                                               : ov_tuned.shrink_idle_rounds),
@@ -144,25 +145,33 @@ cleanup:
     return status;
 }
 
-/* A mesh misses what is narrower than its steps, such as the end of a groove, and the model's may
- * be elsewhere than the original's: what holds has to do so by a finer one, too. */
-static ovoid_status confirm(ov_adaptive *f, double tolerance, ov_trial *best) {
+/* The fine judge, where its meshes are finer than those of the other one. */
+static ovoid_status prepare_fine(ov_adaptive *f) {
     ovoid_status status = OVOID_OK;
     const double coarse = f->options->adaptive.mesh_spacing;
     const double least = ov_tuned.confirm_spacing * sqrt(0.5 / f->options->decay);
     const double fine = fmax(ov_tuned.confirm_finer * coarse, least);
-    ov_trial t = {0};
     if (fine >= coarse)
         return OVOID_OK;
-    f->stage = "confirm";
-    OV_TRY(ov_trial_create(f, &t));
-    ov_trial_copy(best, &t);
     if (!f->fine.mesh)
         OV_TRY(ov_adaptive_judge_at(f, fine, &f->fine));
     ov_judge_begin(&f->fine);
-    f->finely = f->fine.mesh;
-    if (f->finely)
-        OV_TRY(confirm_trial(f, tolerance, &t, best));
+cleanup:
+    return status;
+}
+
+/* A mesh misses what is narrower than its steps, such as the end of a groove, and the model's may
+ * be elsewhere than the original's: what holds has to do so by a finer one, too; and by vertices,
+ * between which triangles may be farther away: it has to do so all over them. */
+static ovoid_status confirm(ov_adaptive *f, double tolerance, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    ov_trial t = {0};
+    f->stage = "confirm";
+    OV_TRY(ov_trial_create(f, &t));
+    ov_trial_copy(best, &t);
+    OV_TRY(prepare_fine(f));
+    ov_adaptive_look_closely(f, true);
+    OV_TRY(confirm_trial(f, tolerance, &t, best));
 cleanup:
     ov_trial_destroy(&t);
     return status;
@@ -178,7 +187,7 @@ static ovoid_status shrink_and_confirm(ov_adaptive *f, double tolerance, ov_tria
     if (f->start) {
         OV_TRY(confirm(f, tolerance, best));
         keeps = ov_trial_holds(best, tolerance);
-        f->finely = false;
+        ov_adaptive_look_closely(f, false);
         OV_TRY(ov_trial_create(f, &kept));
         ov_trial_copy(best, &kept);
     }
@@ -190,16 +199,32 @@ static ovoid_status shrink_and_confirm(ov_adaptive *f, double tolerance, ov_tria
     }
     if (keeps && (best->count >= kept.count || !ov_trial_holds(best, tolerance)))
         ov_trial_swap(&kept, best);
-    f->finely = f->fine.mesh;
+    ov_adaptive_look_closely(f, true);
 cleanup:
     ov_trial_destroy(&kept);
     return status;
 }
 
-ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double tolerance, ov_trial *best) {
+/* Surfaces that end at a part's region, or meet images of themselves, are judged by vertices, as
+ * seams are surveyed in the end. */
+double ov_adaptive_margin(const ov_adaptive *f) {
+    return ov_adaptive_is_part(f) ? 0.0 : ov_tuned.tolerance_margin;
+}
+
+void ov_adaptive_look_closely(ov_adaptive *f, bool closely) {
+    const bool inside = closely && ov_adaptive_margin(f) > 0.0;
+    f->judge.slack = f->fine.slack =
+        inside ? ov_tuned.tolerance_slack * f->options->adaptive.tolerance : 0.0;
+    f->finely = closely && f->fine.mesh;
+}
+
+ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double asked, ov_trial *best) {
     ovoid_status status = OVOID_OK;
-    if (f->start)
+    double tolerance = (1.0 - ov_adaptive_margin(f)) * asked;
+    if (f->start) { /* one that was fitted to it may have come nearer to it in the end */
+        tolerance = (1.0 - 0.5 * ov_adaptive_margin(f)) * asked;
         OV_TRY(grow_start(f, tolerance, best));
+    }
     if (!f->start || !ov_trial_holds(best, tolerance))
         OV_TRY(start_and_grow(f, tolerance, best));
     if (ov_trial_holds(best, tolerance))

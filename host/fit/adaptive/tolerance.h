@@ -25,6 +25,13 @@ bool ov_trial_holds(const ov_trial *t, double tolerance);
 ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
                                ov_spots *spots);
 
+/* What the search keeps free of a tolerance, as a share of it. */
+double ov_adaptive_margin(const ov_adaptive *f);
+
+/* Whether trials are judged at the finer spacing, too, as far as there is one, and inside the
+ * triangles of both, those of parts aside. */
+void ov_adaptive_look_closely(ov_adaptive *f, bool closely);
+
 /* Makes the points within `reach` (angstrom) of the spots weigh `factor` times as much from now on.
  */
 ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots, double reach,
@@ -36,11 +43,12 @@ ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing
                               ov_spots *spots);
 
 /* When shrinking ends: at so many ellipsoids, or when so many rounds and tries in a row gained next
- * to nothing together. */
+ * to nothing together; thorough: of rounds that merged few at once. */
 typedef struct ov_shrinking {
     const char *stage;
     size_t least;
     uint32_t idle_rounds, idle_tries;
+    bool thorough;
 } ov_shrinking;
 
 /* Merges ellipsoids of the best model, which holds, as long as it holds. */

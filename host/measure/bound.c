@@ -165,20 +165,42 @@ static ovoid_status know_corners(ovoid_context *context, bounding *b, const ov_t
     return OVOID_OK;
 }
 
-/* Triangles from number *k on, until there is a piece of those that their corners do not do for. */
+/* Whether a triangle is looked at within limits; its corners' distances. */
+static bool is_within(const bounding *b, const ov_trail *from, size_t k, const float *distance,
+                      double of[3]) {
+    const uint32_t *const corner = from->mesh->corners + 3 * (size_t)ov_trail_triangle(from, k);
+    for (size_t i = 0; i < 3; ++i) {
+        of[i] = (double)distance[corner[i]];
+        if (of[i] < 0.0 || of[i] > b->limits->limit)
+            return false;
+        of[i] += of[i] * ROUNDING + b->margin;
+    }
+    return true;
+}
+
+/* The same where there are none; squared: of the corners. */
+static bool is_outer(const bounding *b, const ov_trail *from, size_t k, const float *squared,
+                     double of[3]) {
+    float square[3];
+    if (!is_exposed(from, k))
+        return false;
+    squared_of(from, k, squared, square);
+    for (size_t i = 0; i < 3; ++i)
+        of[i] = no_less(b, square[i]);
+    return true;
+}
+
+/* Triangles from number *k on, until there is a piece of those that their corners do not do for.
+ * known: of the corners, as is_within() or is_outer() has it. */
 static ovoid_status collect(ovoid_context *context, bounding *b, const ov_trail *from,
-                            const float *squared, size_t *k) {
+                            const float *known, size_t *k) {
     ovoid_status status = OVOID_OK;
     for (; *k < from->triangles && b->now.count < PIECE; ++*k) {
         fragment p;
-        float of[3];
         OV_TRY(ask(context, b, *k, from->triangles));
-        if (!is_exposed(from, *k))
+        if (!(b->limits ? is_within : is_outer)(b, from, *k, known, p.distance))
             continue;
-        squared_of(from, *k, squared, of);
         corners_of(b, from, *k, p.at);
-        for (size_t i = 0; i < 3; ++i)
-            p.distance[i] = no_less(b, of[i]);
         p.most = most_by_corners(&p);
         OV_TRY(keep(context, b, &b->now, &p));
     }
@@ -323,70 +345,38 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_bound_add(ovoid_context *context, ov_meter *meter, ov_facets *facets,
-                          const ov_trail *from, const float *squared, ov_bound *bound) {
+/* All of a surface, piece by piece. known: as collect() has it. */
+static ovoid_status bound_all(ovoid_context *context, bounding *b, const ov_trail *from,
+                              const float *known) {
     ovoid_status status = OVOID_OK;
-    bounding b = {.meter = meter, .facets = facets, .bound = bound};
-    OV_TRY(find_margin(context, from, &b));
-    OV_TRY(find_margin(context, &facets->trail, &b));
-    OV_TRY(know_corners(context, &b, from, squared));
+    OV_TRY(find_margin(context, from, b));
+    OV_TRY(find_margin(context, &b->facets->trail, b));
+    if (!b->limits)
+        OV_TRY(know_corners(context, b, from, known));
     for (size_t k = 0; k < from->triangles;) {
-        OV_TRY(collect(context, &b, from, squared, &k));
-        OV_TRY(bound_piece(context, &b));
+        OV_TRY(collect(context, b, from, known, &k));
+        OV_TRY(bound_piece(context, b));
     }
-    bound->most = fmax(bound->most, bound->least);
 cleanup:
-    bounding_destroy(&b);
+    bounding_destroy(b);
     return status;
 }
 
-/* ---- what is beyond a limit -------------------------------------------------------------------
- */
-
-/* Whether a triangle is looked at; its corners' distances. */
-static bool is_within(const bounding *b, const ov_trail *from, size_t k, const float *distance,
-                      double of[3]) {
-    const uint32_t *const corner = from->mesh->corners + 3 * (size_t)ov_trail_triangle(from, k);
-    for (size_t i = 0; i < 3; ++i) {
-        of[i] = (double)distance[corner[i]];
-        if (of[i] < 0.0 || of[i] > b->limits->limit)
-            return false;
-        of[i] += of[i] * ROUNDING + b->margin;
-    }
-    return true;
-}
-
-/* As collect(). */
-static ovoid_status collect_within(ovoid_context *context, bounding *b, const ov_trail *from,
-                                   const float *distance, size_t *k) {
-    ovoid_status status = OVOID_OK;
-    for (; *k < from->triangles && b->now.count < PIECE; ++*k) {
-        fragment p;
-        OV_TRY(ask(context, b, *k, from->triangles));
-        if (!is_within(b, from, *k, distance, p.distance))
-            continue;
-        corners_of(b, from, *k, p.at);
-        p.most = most_by_corners(&p);
-        OV_TRY(keep(context, b, &b->now, &p));
-    }
-cleanup:
+ovoid_status ov_bound_add(ovoid_context *context, ov_meter *meter, ov_facets *facets,
+                          const ov_trail *from, const float *squared, ov_bound *bound) {
+    bounding b = {.meter = meter, .facets = facets, .bound = bound};
+    const ovoid_status status = bound_all(context, &b, from, squared);
+    if (status == OVOID_OK)
+        bound->most = fmax(bound->most, bound->least);
     return status;
 }
 
 ovoid_status ov_bound_exceed(ovoid_context *context, ov_meter *meter, ov_facets *facets,
                              const ov_trail *from, const float *distance, const ov_limits *limits,
                              bool *whole) {
-    ovoid_status status = OVOID_OK;
     ov_bound bound = {0};
     bounding b = {.meter = meter, .facets = facets, .bound = &bound, .limits = limits};
-    OV_TRY(find_margin(context, from, &b));
-    OV_TRY(find_margin(context, &facets->trail, &b));
-    for (size_t k = 0; k < from->triangles;) {
-        OV_TRY(collect_within(context, &b, from, distance, &k));
-        OV_TRY(bound_piece(context, &b));
-    }
+    const ovoid_status status = bound_all(context, &b, from, distance);
     *whole = bound.most <= limits->limit + limits->slack;
-cleanup:
-    bounding_destroy(&b);
     return status;
 }

@@ -12,9 +12,9 @@
  * area's relative error (angstrom). */
 #define SCORE_WHOLE 0.1
 #define SCORE_AREA 10.0
-/* Where spots are looked for, distances below this share of theirs are only bounded; inside
- * triangles, too, those that leave so much to `least`, in lattice steps: what a triangle reaches
- * beyond its corners, most often. */
+/* Where spots are looked for, distances below this share of theirs are only bounded. Where they are
+ * looked for inside triangles, too, what is bounded has to leave room for how much farther than its
+ * corners a triangle may be, for most of them this many lattice steps. */
 #define ENOUGH 0.8
 #define ENOUGH_INSIDE 0.7
 
@@ -360,8 +360,8 @@ cleanup:
 }
 
 static double enough_of(const ov_judge *judge, double least) {
-    const double inside = least - ENOUGH_INSIDE * judge->meshing.spacing;
-    return judge->slack > 0.0 ? fmax(inside, 0.0) : ENOUGH * least;
+    const double reach = judge->slack > 0.0 ? ENOUGH_INSIDE * judge->meshing.spacing : 0.0;
+    return fmax(fmin(ENOUGH * least, least - reach), 0.0);
 }
 
 /* *spots: of the trial's surfaces; free with free(). */

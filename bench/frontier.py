@@ -6,8 +6,8 @@
     bench/frontier.py --from bench/results/frontier.csv --picture docs/frontier.png
 
 Of each molecule: `ovoid fit` by count (`--ellipsoids N`) and to tolerances, both at the effort 1, by
-count at the effort 0 (`quick`), the paper's model (Tables 1 and 2), and what one would try first, expectation maximisation: scikit-learn's
-GaussianMixture of as many components, of POINTS points for each atom drawn from the atoms' Gaussians,
+count at the effort 0 (`quick`), the paper's model (Tables 1 and 2), and what one would try first,
+expectation maximisation: scikit-learn's GaussianMixture of as many components, of POINTS points for each atom drawn from the atoms' Gaussians,
 each component with the weight that it has of their integral. Needs numpy, matplotlib and, for that,
 scikit-learn (without it those rows are left out).
 """

@@ -317,37 +317,41 @@ static void tell(const ov_adaptive *f, size_t count, const ov_judgement *judgeme
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
 
-/* What a model is held to that had its volume made equal. */
-static double tolerance_of(const ov_adaptive *f) {
-    return (1.0 - 0.5 * ov_adaptive_margin(f)) * f->options->adaptive.tolerance;
-}
-
-/* What was confirmed may be lost by making the volumes equal, and is then as it was. */
-static ovoid_status keep_confirmed(ov_adaptive *f, const ov_trial *best, ov_judgement *judgement) {
+/* By both judges, as far as the first one sees it hold; f->quadrics are the model's. */
+static ovoid_status judge_closely(ov_adaptive *f, size_t count, ov_judgement *judgement) {
     ovoid_status status = OVOID_OK;
-    const double tolerance = tolerance_of(f);
+    const double tolerance = ov_adaptive_held_to(f);
     ov_judge *const judges[2] = {&f->judge, &f->fine};
     bool holds = true;
     for (size_t n = 0; n < (f->finely ? 2 : 1) && holds; ++n) {
-        const size_t count = ov_adaptive_surround(f, best->count);
-        ov_judgement closely;
         ov_spot *spots = NULL;
         size_t found;
-        OV_TRY(ov_judge_spots(judges[n], f->quadrics, count, tolerance, 0.0, 1, &closely, &spots,
-                              &found));
+        OV_TRY(ov_judge_spots(judges[n], f->quadrics, ov_adaptive_surround(f, count), tolerance,
+                              0.0, 1, judgement, &spots, &found));
         free(spots);
-        holds = closely.valid && closely.deviation <= tolerance;
-        if (!holds && best->judgement.deviation > tolerance) {
-            judgement->valid = judgement->valid && closely.valid;
-            judgement->deviation = fmax(judgement->deviation, closely.deviation);
-        }
-    }
-    if (!holds && best->judgement.deviation <= tolerance) {
-        ov_adaptive_quadrics(f, best);
-        *judgement = best->judgement;
+        holds = judgement->valid && judgement->deviation <= tolerance;
     }
 cleanup:
     return status;
+}
+
+/* What was confirmed may be lost by making the volumes equal, and is then as it was. changed:
+ * whether anything was, for that. */
+static ovoid_status keep_confirmed(ov_adaptive *f, const ov_trial *best, bool changed,
+                                   ov_judgement *judgement) {
+    const double tolerance = ov_adaptive_held_to(f);
+    ov_judgement closely = best->judgement;
+    const ovoid_status status = changed ? judge_closely(f, best->count, &closely) : OVOID_OK;
+    if (status != OVOID_OK || (closely.valid && closely.deviation <= tolerance))
+        return status;
+    if (ov_trial_holds(best, tolerance)) {
+        ov_adaptive_quadrics(f, best);
+        *judgement = best->judgement;
+    } else {
+        judgement->valid = judgement->valid && closely.valid;
+        judgement->deviation = fmax(judgement->deviation, closely.deviation);
+    }
+    return OVOID_OK;
 }
 
 /* The last judgement, with the volumes made equal. */
@@ -355,17 +359,11 @@ static ovoid_status finish(ov_adaptive *f, const ov_trial *best, ov_found *found
                            ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_judgement judgement;
-    const double tolerance = tolerance_of(f);
     bool changed;
     ov_adaptive_quadrics(f, best);
     OV_TRY(calibrate(f, best->count, &judgement, &changed));
-    const bool confirmed = f->finely || f->judge.slack > 0.0;
-    if (confirmed && changed) {
-        OV_TRY(keep_confirmed(f, best, &judgement));
-    } else if (confirmed && !ov_trial_holds(best, tolerance)) { /* looked at closely */
-        judgement.valid = judgement.valid && best->judgement.valid;
-        judgement.deviation = fmax(judgement.deviation, best->judgement.deviation);
-    }
+    if (f->finely || f->judge.slack > 0.0)
+        OV_TRY(keep_confirmed(f, best, changed, &judgement));
     OV_TRY(hand_over(f, best, found));
     tell(f, best->count, &judgement, result);
 cleanup:

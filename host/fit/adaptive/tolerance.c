@@ -207,12 +207,16 @@ cleanup:
 
 /* Surfaces that end at a part's region, or meet images of themselves, are judged by vertices, as
  * seams are surveyed in the end. */
-double ov_adaptive_margin(const ov_adaptive *f) {
+static double margin(const ov_adaptive *f) {
     return ov_adaptive_is_part(f) ? 0.0 : ov_tuned.tolerance_margin;
 }
 
+double ov_adaptive_held_to(const ov_adaptive *f) {
+    return (1.0 - 0.5 * margin(f)) * f->options->adaptive.tolerance;
+}
+
 void ov_adaptive_look_closely(ov_adaptive *f, bool closely) {
-    const bool inside = closely && ov_adaptive_margin(f) > 0.0;
+    const bool inside = closely && margin(f) > 0.0;
     f->judge.slack = f->fine.slack =
         inside ? ov_tuned.tolerance_slack * f->options->adaptive.tolerance : 0.0;
     f->finely = closely && f->fine.mesh;
@@ -220,9 +224,9 @@ void ov_adaptive_look_closely(ov_adaptive *f, bool closely) {
 
 ovoid_status ov_adaptive_tolerance(ov_adaptive *f, double asked, ov_trial *best) {
     ovoid_status status = OVOID_OK;
-    double tolerance = (1.0 - ov_adaptive_margin(f)) * asked;
+    double tolerance = (1.0 - margin(f)) * asked;
     if (f->start) { /* one that was fitted to it may have come nearer to it in the end */
-        tolerance = (1.0 - 0.5 * ov_adaptive_margin(f)) * asked;
+        tolerance = ov_adaptive_held_to(f);
         OV_TRY(grow_start(f, tolerance, best));
     }
     if (!f->start || !ov_trial_holds(best, tolerance))

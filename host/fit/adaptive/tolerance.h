@@ -25,8 +25,9 @@ bool ov_trial_holds(const ov_trial *t, double tolerance);
 ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
                                ov_spots *spots);
 
-/* What the search keeps free of a tolerance, as a share of it. */
-double ov_adaptive_margin(const ov_adaptive *f);
+/* What a finished model is held to: the search is for less than what is asked, and half of that is
+ * for making volumes equal. */
+double ov_adaptive_held_to(const ov_adaptive *f);
 
 /* Whether trials are judged at the finer spacing, too, as far as there is one, and inside the
  * triangles of both, those of parts aside. */

@@ -327,7 +327,6 @@ static void numbers_are_shared_out(void **state) {
     ovoid_molecule *molecule = ball(*state, atoms);
     ovoid_fit_options options = in_parts(64, 2);
     ovoid_fit_result result;
-    ovoid_measures measures;
     ovoid_model *none = NULL;
     test_skip_simulated(*state);
     options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
@@ -335,8 +334,7 @@ static void numbers_are_shared_out(void **state) {
     ovoid_model *model = fit(*state, molecule, &options, &result);
     assert_int_equal(ovoid_model_size(model), atoms / 7);
     assert_true(result.reached);
-    measure(*state, molecule, model, &measures);
-    expect_near(result.distance, measures.deviation, 1e-4, "distance");
+    assert_true(isnan(result.distance));
     ovoid_model_destroy(&model);
     options.adaptive.ellipsoids = 2;
     test_refused(*state, ovoid_fit(*state, molecule, &options, &none, NULL), OVOID_ERROR_ARGUMENT,

@@ -54,14 +54,6 @@ static void print_stop(FILE *out, const fit_job *job) {
         fprintf(out, "%zu of %u levels\n", job->levels_done, (unsigned)job->level_count);
 }
 
-/* Whether the deviation below tells more than the fit: a part is compared with what lies about it,
- * and the fit of a number of ellipsoids asks for no more. */
-static bool is_told_below(const fit_job *job) {
-    const ovoid_fit_result *result = &job->levels[0].result;
-    return job->options.adaptive.goal != OVOID_GOAL_TOLERANCE && job->levels[0].measured &&
-           (result->parts > 1 || result->units > 1);
-}
-
 /* What method adaptive was to reach, and what it reached. */
 static void print_goal(FILE *out, const fit_job *job) {
     const ovoid_fit_result *result = &job->levels[0].result;
@@ -79,7 +71,7 @@ static void print_goal(FILE *out, const fit_job *job) {
     if (tolerance && result->verdict != OVOID_VERDICT_REACHED &&
         result->verdict != OVOID_VERDICT_MISSED)
         fprintf(out, "%s: %s\n", reached, fit_unreached(job, reason));
-    else if (isfinite(result->distance) && !is_told_below(job))
+    else if (isfinite(result->distance))
         fprintf(out, "%s, %s%s Å\n", reached, tolerance ? "" : "outer surfaces within ",
                 fit_distance(result->distance, wanted->tolerance, text));
     else

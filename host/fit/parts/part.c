@@ -83,11 +83,10 @@ ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_
     ovoid_status status = OVOID_OK;
     const ov_box *const box = &parts->partition.part[p].cell;
     const ovoid_fit_options *const options = parts->options;
-    const bool by_tolerance = options->adaptive.goal == OVOID_GOAL_TOLERANCE;
     ov_survey_options wanted = {.isovalue = options->isovalue,
                                 .spacing = options->adaptive.mesh_spacing,
                                 .flat = true,
-                                .least = by_tolerance ? options->adaptive.tolerance : INFINITY};
+                                .least = options->adaptive.tolerance};
     ov_scene scene = {0};
     ov_quadric *original = NULL;
     OV_TRY(ov_scene_of_cell(context, parts, p, &scene));

@@ -124,20 +124,21 @@ static void add_results(const ov_parts *parts, ovoid_fit_result *result) {
         add_result(&parts->fit[p].result, result);
     if (parts->ellipsoids && result->verdict != OVOID_VERDICT_MISSED)
         result->verdict = OVOID_VERDICT_REACHED; /* so many were asked for */
+    if (parts
+            ->ellipsoids) /* each part's is not that of the whole, whose measures take their time */
+        result->distance = NAN;
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
 
 /* What the last survey of all says takes the place of what each part said. */
 static void take_survey(const ov_parts *parts, const ov_survey_total *total,
                         ovoid_fit_result *result) {
-    const ovoid_adaptive_options *const wanted = &parts->options->adaptive;
+    const double tolerance = parts->options->adaptive.tolerance;
     if (total->outer[0] == 0 || total->outer[1] == 0 || result->verdict == OVOID_VERDICT_COARSE)
         return;
     result->distance = total->deviation;
     result->ellipsoids = parts->model.count;
-    if (wanted->goal == OVOID_GOAL_TOLERANCE)
-        result->verdict =
-            total->deviation <= wanted->tolerance ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
+    result->verdict = total->deviation <= tolerance ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
 
@@ -481,8 +482,10 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
     OV_TRY(fit_all(context, &j));
     add_results(&parts, result);
     OV_TRY(put_together(context, &parts));
-    OV_TRY(mend_all(context, &j, result));
-    take_survey(&parts, &j.total, result);
+    if (options->adaptive.goal == OVOID_GOAL_TOLERANCE) {
+        OV_TRY(mend_all(context, &j, result));
+        take_survey(&parts, &j.total, result);
+    }
     hand_over(&parts, found);
 cleanup:
     if (status == OVOID_ERROR_CANCELLED && parts.fit)

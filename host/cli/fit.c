@@ -15,9 +15,10 @@
 #define KIB 1024.0
 #endif
 
-/* How many parts are fitted at a time. */
+/* How many parts are fitted at a time, at most. */
 static uint64_t at_once(const fit_job *job) {
-    const uint64_t jobs = job->options.parts.jobs > 1 ? job->options.parts.jobs : 1;
+    const uint64_t wanted = job->options.parts.jobs,
+                   jobs = wanted > 0 ? wanted : OVOID_DEFAULT_JOBS;
     return jobs * ovoid_context_device_count(job->context) * (job->shared ? ranks_count() : 1);
 }
 

@@ -53,7 +53,7 @@ const cli_number fit_parts_numbers[] = {
     COUNT(
         "jobs", parts.jobs, 0, OVOID_MOST_JOBS,
         "so many parts side by side on each device, each with a thread of its own: the model stays "
-        "the same; 0: one"),
+        "the same; 0: one for each two cores up to 4, while memory is plenty"),
 };
 const size_t fit_parts_count = sizeof fit_parts_numbers / sizeof *fit_parts_numbers;
 

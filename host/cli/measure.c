@@ -48,7 +48,7 @@ static const cli_number cell_number = {"cell-atoms",
                                        false,
                                        "",
                                        "measures cell by cell, of at most so many atoms each, so "
-                                       "that memory follows a cell; 0: in cells of 16384 atoms "
+                                       "that memory follows a cell; 0: in cells of 32768 atoms "
                                        "where there are more than 65536, else as a whole"};
 static const cli_number isovalue_number = {
     "isovalue", CLI_REAL, offsetof(measure_row, isovalue), 0, 1e6, true, false, "", ""};

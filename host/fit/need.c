@@ -1,13 +1,15 @@
 #include "fit/need.h"
 
 #include "base/memory.h"
-#include "device/device.h"
 
 /* Of each atom of the molecule: where it is, who it is, and whose it becomes. */
 #define EACH 100.0
 /* Of each atom that is fitted at a time: points, meshes and lists of 48,519 atoms take 4.8 kB, of
  * 120,120 atoms 3.8 kB of each (bench/scaling.py), and what lies about a part comes on top. */
 #define EACH_AT_A_TIME 3000.0
+
+/* A fit comes to several times what it is sure to take. */
+#define ROOM 4.0
 
 #define GB 1e9
 
@@ -34,6 +36,12 @@ ovoid_status ov_need_compare(ovoid_context *context, const ov_need *need, uint64
                    need->atoms, need->jobs > 1 ? need->jobs : (size_t)1, need->jobs > 1 ? "s" : "",
                    need->largest, bytes / GB, (double)available / GB,
                    need->jobs > 1 ? ", or fewer at a time (parts.jobs, --jobs)" : "");
+}
+
+bool ov_need_fits(const ov_device *device, const ov_need *need) {
+    const bool own = device->info.type != OVOID_DEVICE_CPU;
+    const uint64_t available = own ? device->info.global_memory : ov_memory_available();
+    return ROOM * ov_need_bytes(need) <= (double)available;
 }
 
 ovoid_status ov_need_check(ovoid_context *context, const ov_need *need) {

@@ -7,12 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
-/* Cores for each hand, as drivers have threads of their own, and hands at most: each keeps memory
- * of the host and of the device. */
-#define CORES_EACH 2
-#define HANDS_PAY 4
 /* Tasks that may be done before their turn to be committed, for each hand. */
 #define AHEAD 2
 /* How often the caller is asked while it waits for others, seconds. */
@@ -44,13 +39,11 @@ struct ov_hands {
 /* ---- who there is ---------------------------------------------------------------------------- */
 
 static size_t choose_count(const ov_device *device, size_t wanted) {
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t pay = cores > 0 ? (size_t)cores / CORES_EACH : 1;
     if (device->borrowed || device->profile)
         return 1;
     if (wanted > 0)
         return wanted < OV_HANDS_MOST ? wanted : OV_HANDS_MOST;
-    return pay < 1 ? 1 : pay < HANDS_PAY ? pay : HANDS_PAY;
+    return ov_device_company(device);
 }
 
 ovoid_status ov_hands_create(ovoid_context *context, size_t wanted, ov_hands **hands) {

@@ -142,7 +142,8 @@ typedef struct ovoid_parts_options { /* 32 bytes */
     uint32_t atoms;  /* of a part at most, from OVOID_LEAST_PART_ATOMS; 0: OVOID_DEFAULT_PART_ATOMS
                         in a molecule of more than OVOID_DEFAULT_WHOLE_ATOMS, else all of them */
     uint32_t jobs;   /* parts side by side on each device, each with a thread and a queue of its
-                        own, at most OVOID_MOST_JOBS; 0: 1 */
+                        own, at most OVOID_MOST_JOBS; 0: as many as pay, one for each two of
+                        the host's cores up to OVOID_DEFAULT_JOBS, while memory is plenty */
     uint32_t resume; /* not 0: goes on where the checkpoint ends, if there is one */
     uint32_t symmetry;      /* an ovoid_symmetry: USE. A fit that begins with a model uses none */
     const char *checkpoint; /* a file that gets each part as it is done, or NULL. It may not be
@@ -154,6 +155,7 @@ typedef struct ovoid_parts_options { /* 32 bytes */
 
 #define OVOID_LEAST_PART_ATOMS 64
 #define OVOID_MOST_JOBS 64
+#define OVOID_DEFAULT_JOBS 4
 
 typedef struct ovoid_fit_options {
     size_t size;

@@ -19,7 +19,7 @@ typedef struct ovoid_pair { /* 24 bytes */
 /* Surfaces of more atoms, or ellipsoids, than this are measured cell by cell, in cells of so many.
  */
 #define OVOID_DEFAULT_MEASURE_ATOMS 65536
-#define OVOID_DEFAULT_CELL_ATOMS 16384
+#define OVOID_DEFAULT_CELL_ATOMS 32768
 
 typedef struct ovoid_measure_options {
     size_t size;

@@ -26,6 +26,7 @@ typedef struct ov_parts {
     double reach;  /* and what is this far from it counts there */
     ov_partition partition;
     ov_part_fit *fit;   /* of each part */
+    size_t jobs;        /* so many parts at a time on each device */
     size_t *ellipsoids; /* of each, where their number is what is asked for; else NULL */
     ov_found model;     /* of all of them, when they are done */
 } ov_parts;

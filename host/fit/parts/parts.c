@@ -154,10 +154,6 @@ typedef struct job {
     ov_survey_total total;
 } job;
 
-static size_t jobs_of(const ov_parts *parts) {
-    return parts->options->parts.jobs > 1 ? parts->options->parts.jobs : 1;
-}
-
 static ovoid_status fit_task(ovoid_context *context, size_t part, size_t done, void *user) {
     job *const j = user;
     return ov_part_fit_atoms(context, j->parts, part, done, &j->fresh[part]);
@@ -226,7 +222,7 @@ static ovoid_status fit_all(ovoid_context *context, job *j) {
     OV_TRY(resume(context, j));
     for (size_t p = 0; p < cut->count; ++p)
         j->todo[p] = !j->todo[p]; /* what is not done */
-    OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, jobs_of(j->parts), &work));
+    OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, j->parts->jobs, &work));
 cleanup:
     ov_checkpoint_close(&j->file);
     return status;
@@ -274,7 +270,7 @@ static ovoid_status survey(ovoid_context *context, job *j) {
                                      .spacing = j->parts->options->adaptive.mesh_spacing,
                                      .centre = j->parts->centre};
     ov_progress_stage(context, "measure");
-    OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, jobs_of(j->parts), &work));
+    OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, j->parts->jobs, &work));
     ov_survey_total_destroy(&j->total);
     OV_TRY(ov_survey_join(context, j->cell, cut->count, &images, ov_tuned.spots_apart, &j->total));
 cleanup:
@@ -335,7 +331,7 @@ static ovoid_status mend(ovoid_context *context, job *j, ovoid_fit_result *resul
     ovoid_status status = OVOID_OK;
     ov_box *touched = NULL;
     size_t count = 0;
-    OV_TRY(ov_patches_mend(context, j->parts, jobs_of(j->parts), j->total.spot, j->total.spots,
+    OV_TRY(ov_patches_mend(context, j->parts, j->parts->jobs, j->total.spot, j->total.spots,
                            &touched, &count, result));
     choose_touched(j, touched, count);
     OV_TRY(survey(context, j));
@@ -400,12 +396,24 @@ static void destroy(ov_parts *parts, job *j) {
     ov_partition_destroy(&parts->partition);
 }
 
-static ovoid_status check_need(ovoid_context *context, const ov_parts *parts) {
+/* So many parts at a time as are asked for or, by default, as pay and as there is memory for. */
+static ovoid_status choose_jobs(ovoid_context *context, ov_parts *parts) {
+    ovoid_status status = OVOID_OK;
+    ov_device *device;
     ov_need need = {.atoms = parts->atoms, .jobs = parts->options->parts.jobs};
+    OV_TRY(ov_device_get(context, &device));
     for (size_t p = 0; p < parts->partition.count; ++p)
         if (parts->partition.part[p].count > need.largest)
             need.largest = parts->partition.part[p].count;
-    return ov_need_check(context, &need);
+    if (need.jobs == 0) {
+        need.jobs = ov_device_company(device);
+        while (need.jobs > 1 && !ov_need_fits(device, &need))
+            --need.jobs;
+    }
+    OV_TRY(ov_need_check(context, &need));
+    parts->jobs = need.jobs;
+cleanup:
+    return status;
 }
 
 static ovoid_status prepare(ovoid_context *context, ov_parts *parts, job *j) {
@@ -419,7 +427,7 @@ static ovoid_status prepare(ovoid_context *context, ov_parts *parts, job *j) {
     OV_TRY(ov_partition_create(context, parts->xyzr, parts->atoms, most_of(options, parts->atoms),
                                &parts->partition));
     const size_t count = parts->partition.count;
-    OV_TRY(check_need(context, parts));
+    OV_TRY(choose_jobs(context, parts));
     OV_TRY(share_out(context, parts));
     parts->fit = ov_alloc(context, count, sizeof *parts->fit, "parts of a molecule");
     j->cell = ov_alloc(context, count, sizeof *j->cell, "parts of a molecule");

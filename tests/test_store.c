@@ -321,13 +321,13 @@ static int close_subject(void **state) {
 }
 
 /* limit 0: in memory. */
-static ovoid_status make_mesh(const subject *s, size_t limit, ovoid_vertex_rule rule,
-                              ovoid_mesh **mesh) {
+static ovoid_status make_mesh(const subject *s, size_t limit, double spacing,
+                              ovoid_vertex_rule rule, ovoid_mesh **mesh) {
     ovoid_mesh_options options;
     ovoid_mesh_options_init(&options, sizeof options);
     assert_null(options.folder);
     options.vertices = rule;
-    options.spacing = test_small() ? 1.0 : 0.5;
+    options.spacing = test_small() ? 1.0 : spacing;
     options.folder = limit > 0 ? s->place->folder : NULL;
     ov_store_limit(limit);
     const ovoid_status status = once_molecule_mesh(s->context, s->molecule, 0.5, &options, mesh);
@@ -393,27 +393,35 @@ static void expect_all_kinds(const ovoid_mesh *mesh) {
     assert_true(cavities > 0 && finer > 0 && mesh->components > cavities + 3);
 }
 
+/* In a few parts and passes, and in many. */
 static void a_mesh_is_the_same_in_files(void **state) {
     static const char *const extensions[] = {".ply", ".obj", ".stl", ".off", ".glb"};
-    const size_t limits[] = {64, LIMIT};
+    static const struct {
+        size_t limit;
+        double spacing;
+        ovoid_vertex_rule rule;
+    } cases[] = {{64, 0.5, OVOID_VERTEX_EXACT},
+                 {64, 0.5, OVOID_VERTEX_LINEAR},
+                 {LIMIT, 0.12, OVOID_VERTEX_EXACT},
+                 {LIMIT, 0.3, OVOID_VERTEX_LINEAR}};
     const subject *const s = *state;
     test_skip_simulated(s->context);
-    for (int rule = OVOID_VERTEX_EXACT; rule <= OVOID_VERTEX_LINEAR; ++rule)
-        for (size_t n = 0; n < sizeof limits / sizeof *limits; ++n) {
-            ovoid_mesh *mesh = NULL, *kept = NULL;
-            test_check(s->context, make_mesh(s, 0, (ovoid_vertex_rule)rule, &mesh));
-            assert_int_equal(files_of_store(), 0);
-            test_check(s->context, make_mesh(s, limits[n], (ovoid_vertex_rule)rule, &kept));
-            assert_true(files_of_store() >= 5); /* xyz, normals, corners, edges, components */
-            assert_int_equal(scratch_entries(s->place), 0);
-            expect_all_kinds(mesh);
-            expect_same_meshes(mesh, kept);
-            for (size_t k = 0; k < sizeof extensions / sizeof *extensions; ++k)
-                expect_same_bytes(s, mesh, kept, extensions[k]);
-            ovoid_mesh_destroy(&mesh);
-            ovoid_mesh_destroy(&kept);
-            assert_int_equal(files_of_store(), 0);
-        }
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; ++n) {
+        const double h = cases[n].spacing;
+        ovoid_mesh *mesh = NULL, *kept = NULL;
+        test_check(s->context, make_mesh(s, 0, h, cases[n].rule, &mesh));
+        assert_int_equal(files_of_store(), 0);
+        test_check(s->context, make_mesh(s, cases[n].limit, h, cases[n].rule, &kept));
+        assert_true(files_of_store() >= 5); /* xyz, normals, corners, edges, components */
+        assert_int_equal(scratch_entries(s->place), 0);
+        expect_all_kinds(mesh);
+        expect_same_meshes(mesh, kept);
+        for (size_t k = 0; k < sizeof extensions / sizeof *extensions; ++k)
+            expect_same_bytes(s, mesh, kept, extensions[k]);
+        ovoid_mesh_destroy(&mesh);
+        ovoid_mesh_destroy(&kept);
+        assert_int_equal(files_of_store(), 0);
+    }
 }
 
 /* The pairs that were found, in whatever order. */
@@ -445,8 +453,8 @@ static void neighbours_are_the_same_in_files(void **state) {
     const subject *const s = *state;
     ovoid_mesh *mesh = NULL, *kept = NULL;
     test_skip_simulated(s->context);
-    test_check(s->context, make_mesh(s, 0, OVOID_VERTEX_EXACT, &mesh));
-    test_check(s->context, make_mesh(s, 64, OVOID_VERTEX_EXACT, &kept));
+    test_check(s->context, make_mesh(s, 0, 0.5, OVOID_VERTEX_EXACT, &mesh));
+    test_check(s->context, make_mesh(s, 64, 0.5, OVOID_VERTEX_EXACT, &kept));
     for (double reach = 0.02; reach < 20.0; reach *= 7.0) {
         const pairs all = find_pairs(s, mesh, reach), same = find_pairs(s, kept, reach);
         print_message("%zu pairs within %g angstrom\n", all.count, reach);
@@ -468,7 +476,7 @@ static void a_full_disk_at_any_time_is_an_error(void **state) {
         ovoid_mesh *mesh = NULL;
         room_calls = 0;
         room_fails_at = at;
-        status = make_mesh(s, 1024, OVOID_VERTEX_EXACT, &mesh);
+        status = make_mesh(s, 1024, 0.5, OVOID_VERTEX_EXACT, &mesh);
         if (status != OVOID_OK) {
             test_refused(s->context, status, OVOID_ERROR_IO, "No space left on device");
             test_refused(s->context, status, OVOID_ERROR_IO, s->place->folder);

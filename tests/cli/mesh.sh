@@ -78,6 +78,15 @@ expect_code 0
 wait $!
 cmp one.ply two.ply || fail "a mesh in a pipe should be the same"
 rmdir place || fail "nothing should be left in TMPDIR"
+
+# Large arrays are in the folder of the output, wherever a link to it is: where files may not be
+# long, that is what has no room.
+mkdir place
+ln -s place/three.ply link.ply
+run sh -c 'trap "" XFSZ && ulimit -f 16000 && exec "$@"' sh "$OVOID" mesh a.xyzr -o link.ply --spacing 0.02
+expect_code 4
+expect_err "in a file in folder 'place': File too large"
+rmdir place || fail "nothing should be left of a mesh without room"
 rm -f ./*.ply ./b.* model.txt
 
 refused() {

@@ -10,6 +10,7 @@
  * all of few fail, and of many one of each function's by itself, and some with all that follow.
  * OVOID_FAULTS_WORK="fit by l1" takes the works alone whose names begin so.
  */
+#include "base/store.h"
 #include "faults.h"
 #include "once.h"
 #include "scratch.h"
@@ -98,6 +99,19 @@ static ovoid_status make_mesh(ovoid_context *context, outcome *o) {
     ovoid_mesh_options_init(&options, sizeof options);
     options.spacing = 1.0;
     return once_molecule_mesh(context, input.molecule, 0.5, &options, &o->mesh);
+}
+
+/* All of its arrays are in files. */
+static ovoid_status make_mesh_in_files(ovoid_context *context, outcome *o) {
+    ovoid_mesh_options options;
+    ovoid_mesh_options_init(&options, sizeof options);
+    options.spacing = 1.0;
+    options.folder = input.place->folder;
+    ov_store_limit(1);
+    const ovoid_status status =
+        once_molecule_mesh(context, input.molecule, 0.5, &options, &o->mesh);
+    ov_store_limit(0);
+    return status;
 }
 
 static ovoid_status write_mesh(ovoid_context *context, outcome *o) {
@@ -190,6 +204,7 @@ static const work works[] = {
     {"field", evaluate, NULL, false},
     {"field, with times", take_times, NULL, false},
     {"map", write_map, input.map_file, false},
+    {"mesh in files", make_mesh_in_files, NULL, false},
     {"mesh file", write_mesh, input.mesh_file, false},
     {"page", write_page, input.page_file, false},
     {"print", write_print, input.print_file, false},

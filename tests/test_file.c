@@ -265,6 +265,42 @@ static void check_changes_nothing(void **state) {
     assert_int_equal(scratch_entries(s), 1);
 }
 
+static void assert_folder(const char *path, const char *wanted) {
+    char *folder = NULL;
+    assert_int_equal(ovoid_file_folder(context, path, &folder), OVOID_OK);
+    assert_string_equal(folder, wanted);
+    ovoid_free(folder);
+}
+
+static void folder_of_an_output(void **state) {
+    scratch *s = *state;
+    char *folder = NULL;
+    const char *const tmpdir = getenv("TMPDIR");
+    char *const before = tmpdir ? strdup(tmpdir) : NULL;
+    assert_folder("file", ".");
+    assert_folder("folder/file", "folder");
+    assert_folder("/file", "/");
+    assert_folder(scratch_path(s, "file"), s->folder);
+    assert_int_equal(symlink("/usr/file", scratch_path(s, "link")), 0);
+    assert_int_equal(symlink("link", scratch_path(s, "further")), 0);
+    assert_folder(scratch_path(s, "link"), "/usr");
+    assert_folder(scratch_path(s, "further"), "/usr");
+    assert_int_equal(setenv("TMPDIR", s->folder, 1), 0);
+    assert_folder("-", s->folder);
+    assert_folder("/dev/null", s->folder);
+    assert_folder("file", ".");
+    assert_int_equal(setenv("TMPDIR", scratch_path(s, "missing"), 1), 0);
+    assert_folder("/dev/null", "/tmp");
+    assert_int_equal(unsetenv("TMPDIR"), 0);
+    assert_folder("-", "/tmp");
+    if (before)
+        assert_int_equal(setenv("TMPDIR", before, 1), 0);
+    free(before);
+    assert_int_equal(ovoid_file_folder(context, s->folder, &folder), OVOID_ERROR_IO);
+    assert_error("Is a directory");
+    assert_null(folder);
+}
+
 static void full_device_is_reported(void **state) {
     (void)state;
     if (access("/dev/full", W_OK) != 0) {
@@ -348,6 +384,7 @@ int main(void) {
         IN_SCRATCH(missing_folder_is_named),
         IN_SCRATCH(folder_in_place_fails),
         IN_SCRATCH(read_only_places_fail),
+        IN_SCRATCH(folder_of_an_output),
         IN_SCRATCH(check_changes_nothing),
         IN_SCRATCH(full_disk_leaves_the_old_file),
         IN_SCRATCH(failed_rename_leaves_nothing),

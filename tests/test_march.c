@@ -983,7 +983,7 @@ static void large_pieces_are_left_alone(void **state) {
             options_of((double[]){1.0, 3.0, 4.0}[k], 0.5, OVOID_VERTEX_EXACT);
         ovoid_mesh *plain = NULL, *mesh = NULL;
         test_check(*state, ov_march(*state, bodies, atoms, &options, whole, &plain));
-        test_check(*state, ov_mesh_bodies(*state, bodies, atoms, &options, &mesh));
+        test_check(*state, ov_mesh_bodies(*state, NULL, bodies, atoms, &options, &mesh));
         assert_int_equal(mesh->missed, 0);
         assert_int_equal(ovoid_mesh_components(mesh), ovoid_mesh_components(plain));
         expect_near(ovoid_mesh_smooth_area(mesh) / ovoid_mesh_smooth_area(plain), 1.0, 1e-4,

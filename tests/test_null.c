@@ -244,8 +244,12 @@ static void files(void **state) {
     (void)state;
     ovoid_context *const c = all.context;
     ovoid_file *file = NULL;
+    char *folder = NULL;
     REFUSED(ovoid_file_check, context, NULL, "-");
     REFUSED(ovoid_file_check, path, c, NULL);
+    REFUSED(ovoid_file_folder, context, NULL, "-", &folder);
+    REFUSED(ovoid_file_folder, path, c, NULL, &folder);
+    REFUSED(ovoid_file_folder, folder, c, "-", NULL);
     REFUSED(ovoid_file_create, context, NULL, "-", &file);
     REFUSED(ovoid_file_create, path, c, NULL, &file);
     REFUSED(ovoid_file_create, file, c, "-", NULL);

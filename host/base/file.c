@@ -118,9 +118,10 @@ static ovoid_status fail_folder(ovoid_context *context, const char *path, const 
                    path, shown, folder, strerror(error));
 }
 
-/* Makes an empty file of a name that nobody has, in the folder of target->path. */
-static ovoid_status temporary_create(ovoid_context *context, const char *path,
-                                     const ov_target *target, int *descriptor, char **name) {
+/* Makes an empty file of a name that nobody has: `folder`, of this length, with what follows it.
+ * Returns an error number, or 0. */
+static int new_file(const char *folder, size_t length, int how, mode_t mode, int *descriptor,
+                    char **name) {
     static atomic_uint counter;
     char last[64];
     for (int i = 0; i < NAME_TRIES; i++) {
@@ -128,20 +129,41 @@ static ovoid_status temporary_create(ovoid_context *context, const char *path,
         clock_gettime(CLOCK_REALTIME, &now);
         snprintf(last, sizeof last, ".ovoid-%ld-%u-%lx.tmp", (long)getpid(),
                  atomic_fetch_add(&counter, 1), (unsigned long)now.tv_nsec);
-        *name = join(context, target->path, folder_length(target->path), last);
+        *name = join(NULL, folder, length, last);
         if (!*name)
-            return OVOID_ERROR_MEMORY;
+            return ENOMEM;
         ov_temporary_begin(*name); /* before it is there */
-        *descriptor = open(*name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOCTTY, 0666);
+        *descriptor = open(*name, how | O_CREAT | O_EXCL | O_CLOEXEC | O_NOCTTY, mode);
         if (*descriptor >= 0)
-            return OVOID_OK;
+            return 0;
         int error = errno;
         ov_temporary_end(*name);
         *name = NULL;
         if (error != EEXIST)
-            return fail_folder(context, path, target->path, error);
+            return error;
     }
-    return fail_folder(context, path, target->path, EEXIST);
+    return EEXIST;
+}
+
+/* Makes one in the folder of target->path. */
+static ovoid_status temporary_create(ovoid_context *context, const char *path,
+                                     const ov_target *target, int *descriptor, char **name) {
+    const int error =
+        new_file(target->path, folder_length(target->path), O_WRONLY, 0666, descriptor, name);
+    if (error == ENOMEM)
+        return ov_fail(context, OVOID_ERROR_MEMORY, "out of memory for a file name");
+    return error ? fail_folder(context, path, target->path, error) : OVOID_OK;
+}
+
+int ov_file_nameless(const char *folder, int *descriptor) {
+    char *name = NULL, *const within = join(NULL, folder, strlen(folder), "/");
+    const int error =
+        within ? new_file(within, strlen(within), O_RDWR, 0600, descriptor, &name) : ENOMEM;
+    if (!error)
+        unlink(name);
+    ov_temporary_end(name);
+    free(within);
+    return error;
 }
 
 /* Gives the new file the owner and permissions of the one it replaces, as far as we may. */
@@ -330,6 +352,41 @@ ovoid_status ovoid_file_commit(ovoid_context *context, ovoid_file *file) {
     if (!file->output.stream)
         return fail_finished(context, __func__);
     return ov_output_commit(context, &file->output);
+}
+
+/* The folder of a path, to be freed; NULL without memory. */
+static char *folder_of(ovoid_context *context, const char *path) {
+    const size_t length = folder_length(path);
+    if (length == 0)
+        return join(context, ".", 1, "");
+    return join(context, path, length > 1 ? length - 1 : length, "");
+}
+
+/* Where temporary files belong that have no better place. */
+static const char *temporary_folder(void) {
+    const char *const named = getenv("TMPDIR");
+    struct stat info;
+    return named && stat(named, &info) == 0 && S_ISDIR(info.st_mode) ? named : "/tmp";
+}
+
+ovoid_status ovoid_file_folder(ovoid_context *context, const char *path, char **folder) {
+    OV_NEED(context, context);
+    OV_NEED(context, path);
+    OV_NEED(context, folder);
+    ov_target target = {.in_place = true};
+    if (!is_standard_output(path)) {
+        const ovoid_status status = target_find(context, path, &target);
+        if (status != OVOID_OK)
+            return status;
+    }
+    const char *const temporary = temporary_folder();
+    char *const found = target.in_place ? join(context, temporary, strlen(temporary), "")
+                                        : folder_of(context, target.path);
+    free(target.path);
+    if (!found)
+        return OVOID_ERROR_MEMORY;
+    *folder = found;
+    return OVOID_OK;
 }
 
 void ovoid_file_destroy(ovoid_file **file) {

@@ -27,6 +27,10 @@ ovoid_status ov_output_commit(ovoid_context *context, ov_output *output);
 /* Closes and removes the temporary file; nothing happens on a committed or zeroed output. */
 void ov_output_abandon(ov_output *output);
 
+/* A file without a name in the folder, to read and write, on any file system: it has a name for a
+ * moment. Returns an error number, or 0. */
+int ov_file_nameless(const char *folder, int *descriptor);
+
 /* Fails as ov_output_open() would for this path now, without changing what is there. */
 ovoid_status ov_output_check(ovoid_context *context, const char *path);
 

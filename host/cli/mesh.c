@@ -9,6 +9,7 @@ typedef struct mesh_job {
     const char *input;
     const char *output;
     char *default_output; /* owned, output may point to it */
+    char *folder;         /* of large arrays, owned */
     const char *device;   /* NULL: the default */
     bool quiet, decay_given, isovalue_given;
     reading reading;
@@ -41,20 +42,22 @@ static void set_defaults(mesh_job *job) {
 void cli_mesh_help(FILE *stream) {
     mesh_job defaults = {0};
     set_defaults(&defaults);
-    fputs("Usage: ovoid mesh INPUT [OPTION]...\n"
-          "\n"
-          "Writes the surface of a molecule or of a model as a closed triangle mesh, made by\n"
-          "marching cubes, with normals from the field's gradient. INPUT is a molecule (PDB,\n"
-          "mmCIF, PQR or XYZR, also compressed with gzip), a model that 'ovoid fit' wrote, or -\n"
-          "for standard input.\n"
-          "\n"
-          "Files:\n"
-          "  -o, --output FILE   where the mesh goes; its name ends in .ply (binary), .obj, .stl\n"
-          "                      (binary), .off or .glb (binary glTF) (default: the name of the\n"
-          "                      input with the extension .ply, in the current folder)\n"
-          "\n"
-          "The file appears whole at the end or not at all; one that exists is replaced.\n",
-          stream);
+    fputs(
+        "Usage: ovoid mesh INPUT [OPTION]...\n"
+        "\n"
+        "Writes the surface of a molecule or of a model as a closed triangle mesh, made by\n"
+        "marching cubes, with normals from the field's gradient. INPUT is a molecule (PDB,\n"
+        "mmCIF, PQR or XYZR, also compressed with gzip), a model that 'ovoid fit' wrote, or -\n"
+        "for standard input.\n"
+        "\n"
+        "Files:\n"
+        "  -o, --output FILE   where the mesh goes; its name ends in .ply (binary), .obj, .stl\n"
+        "                      (binary), .off or .glb (binary glTF) (default: the name of the\n"
+        "                      input with the extension .ply, in the current folder)\n"
+        "\n"
+        "The file appears whole at the end or not at all; one that exists is replaced. Arrays of\n"
+        "a large mesh are in files without a name in its folder on the way.\n",
+        stream);
     reading_help(stream, true);
     fputs("\n"
           "Running:\n" CLI_HELP_RUNNING "\n"
@@ -220,10 +223,13 @@ static void measure_mesh(mesh_job *job) {
     job->volume = exact ? ovoid_mesh_smooth_volume(job->mesh) : ovoid_mesh_volume(job->mesh);
 }
 
+/* Of what was read only the field is kept. */
 static ovoid_status make_mesh(mesh_job *job) {
     const double begin = cli_seconds();
     ovoid_status status =
         source_field(job->context, &job->source, job->decay, job->options.isovalue);
+    ovoid_molecule_destroy(&job->source.molecule);
+    ovoid_model_destroy(&job->source.model);
     if (status == OVOID_OK)
         status = ovoid_field_mesh(job->context, job->source.field, &job->options, &job->mesh);
     job->mesh_seconds = cli_seconds() - begin;
@@ -250,8 +256,12 @@ static int run(mesh_job *job) {
     if ((status = cli_open_device(job->context, job->device, job->quiet)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_DEVICE);
     print_before(job);
+    status = ovoid_file_folder(job->context, job->output, &job->folder);
+    if (status != OVOID_OK)
+        return cli_failure(job->context, status, CLI_OUTPUT);
+    job->options.folder = job->folder;
     if ((status = make_mesh(job)) != OVOID_OK)
-        return cli_failure(job->context, status, CLI_INPUT);
+        return cli_failure(job->context, status, CLI_OUTPUT);
     measure_mesh(job);
     if ((status = ovoid_mesh_write(job->context, job->mesh, job->output)) != OVOID_OK)
         return cli_failure(job->context, status, CLI_OUTPUT);
@@ -270,6 +280,7 @@ int cli_mesh(int argc, char **argv) {
     ovoid_mesh_destroy(&job.mesh);
     source_destroy(&job.source);
     ovoid_context_destroy(&job.context);
+    ovoid_free(job.folder);
     free(job.default_output);
     return code;
 }

@@ -429,8 +429,10 @@ cleanup:
 /* A surface that is nowhere: says why. */
 static ovoid_status check_surfaces(job *j, const ovoid_field **empty) {
     for (size_t n = 0; n < OV_SURVEY_SIDES; ++n) {
-        ovoid_mesh_options meshing = {sizeof meshing, j->options.isovalue, j->options.spacing,
-                                      j->options.vertices};
+        ovoid_mesh_options meshing = {.size = sizeof meshing,
+                                      .isovalue = j->options.isovalue,
+                                      .spacing = j->options.spacing,
+                                      .vertices = j->options.vertices};
         ovoid_mesh *none = NULL;
         size_t pieces = 0;
         for (size_t c = 0; c < j->cells; ++c)

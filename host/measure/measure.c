@@ -213,7 +213,10 @@ ovoid_status ovoid_measure(ovoid_context *context, ovoid_field *original, ovoid_
     ovoid_measure_options_init(&o, sizeof o);
     OV_TRY(OV_SIZED_TAKE(context, ovoid_measure_options, options, &o));
     OV_TRY(ov_sized_check(context, "ovoid_measures", measures));
-    const ovoid_mesh_options wanted = {sizeof wanted, o.isovalue, o.spacing, o.vertices};
+    const ovoid_mesh_options wanted = {.size = sizeof wanted,
+                                       .isovalue = o.isovalue,
+                                       .spacing = o.spacing,
+                                       .vertices = o.vertices};
     OV_TRY(ov_mesh_options_take(context, &wanted, original, &meshing));
     if (cell_terms(&o, original, sparse) > 0)
         OV_TRY(measure_large(context, original, sparse, &meshing, &o, &made));

@@ -22,7 +22,8 @@ static size_t part_begin(const ovoid_mesh *mesh, size_t parts, size_t k) {
 /* ---- what hangs together --------------------------------------------------------------------- */
 
 /* A share of the triangles, and of the vertices. Triangles follow their vertices, so that most have
- * theirs in their own part; the others are left for later. */
+ * theirs in their own part; the others are left for later. Of a mesh in files nothing is listed,
+ * and they are looked for again. */
 typedef struct stretch {
     size_t first, end;               /* triangles */
     uint32_t first_vertex, last_end; /* vertices */
@@ -61,13 +62,17 @@ static void unite_part(size_t k, void *user) {
     stretch *const s = &u->part[k];
     const uint32_t *const corners = u->mesh->corners;
     uint32_t *const of = u->mesh->component_of;
-    for (uint32_t v = s->first_vertex; v < s->last_end; ++v)
+    for (uint32_t v = s->first_vertex; v < s->last_end; ++v) {
+        ov_store_turn(u->mesh->store, v);
         of[v] = v;
-    for (size_t t = s->first; t < s->end; ++t)
+    }
+    for (size_t t = s->first; t < s->end; ++t) {
+        ov_store_turn(u->mesh->store, t);
         if (is_within(s, corners + 3 * t))
             unite_triangle(of, corners + 3 * t);
-        else
+        else if (!u->mesh->store)
             leave(s, t);
+    }
 }
 
 /* Where a part's first triangle begins, its vertices do. */
@@ -87,11 +92,22 @@ static void cut(uniting *u) {
     u->part[u->parts - 1].last_end = (uint32_t)mesh->vertices;
 }
 
+static void find_left(const uniting *u, const stretch *s) {
+    const uint32_t *const corners = u->mesh->corners;
+    for (size_t t = s->first; t < s->end; ++t) {
+        ov_store_turn(u->mesh->store, t);
+        if (!is_within(s, corners + 3 * t))
+            unite_triangle(u->mesh->component_of, corners + 3 * t);
+    }
+}
+
 static bool unite_left(uniting *u) {
     bool whole = true;
     for (size_t k = 0; k < u->parts; ++k) {
         stretch *const s = &u->part[k];
         whole = whole && !s->failed;
+        if (u->mesh->store)
+            find_left(u, s);
         for (size_t n = 0; n < s->left_count; ++n)
             unite_triangle(u->mesh->component_of, u->mesh->corners + 3 * (size_t)s->left[n]);
         free(s->left);
@@ -107,8 +123,10 @@ ovoid_status ov_components_find(ovoid_context *context, ovoid_mesh *mesh) {
     ov_parallel(u.parts, unite_part, &u);
     if (!unite_left(&u))
         return ov_fail(context, OVOID_ERROR_MEMORY, "no memory for the components of a mesh");
-    for (size_t v = 0; v < mesh->vertices; ++v)
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        ov_store_turn(mesh->store, v);
         count += of[v] == v;
+    }
     mesh->components = count;
     mesh->component = ov_alloc(context, count, sizeof *mesh->component, "components of a mesh");
     if (!mesh->component)
@@ -116,6 +134,7 @@ ovoid_status ov_components_find(ovoid_context *context, ovoid_mesh *mesh) {
     /* Parents come before their children: when v is met, of[parent] is a component already. */
     uint32_t next = 0;
     for (size_t v = 0; v < mesh->vertices; ++v) {
+        ov_store_turn(mesh->store, v);
         of[v] = of[v] == v ? next++ : of[of[v]];
         ++mesh->component[of[v]].vertices;
     }
@@ -135,6 +154,7 @@ typedef struct measuring {
     const ovoid_mesh *mesh;
     const uint32_t *first; /* vertex of each component */
     size_t parts;
+    size_t begin; /* the first part of those at hand */
     struct {
         stint *stint;
         size_t count, capacity;
@@ -153,14 +173,17 @@ static size_t measure_stint(const measuring *m, size_t t, size_t end, stint *mad
     double origin[3];
     *made = (stint){.component = component_at(mesh, t)};
     ov_mesh_at(mesh, m->first[made->component], origin);
-    for (; t < end && component_at(mesh, t) == made->component; ++t)
+    for (; t < end && component_at(mesh, t) == made->component; ++t) {
+        ov_store_turn(mesh->store, t);
         ov_mesh_flat_triangle(mesh, t, origin, &made->content);
+    }
     made->triangles = t - from;
     return t;
 }
 
-static void measure_part(size_t k, void *user) {
+static void measure_part(size_t number, void *user) {
     measuring *const m = user;
+    const size_t k = m->begin + number;
     const size_t end = part_begin(m->mesh, m->parts, k + 1);
     for (size_t t = part_begin(m->mesh, m->parts, k); t < end && !m->part[k].failed;) {
         m->part[k].failed = ov_grow(NULL, &m->part[k].stint, &m->part[k].capacity,
@@ -170,9 +193,9 @@ static void measure_part(size_t k, void *user) {
     }
 }
 
-static bool add_stints(measuring *m, ovoid_component *components) {
+static bool add_stints(measuring *m, size_t end, ovoid_component *components) {
     bool whole = true;
-    for (size_t k = 0; k < m->parts; ++k) {
+    for (size_t k = m->begin; k < end; ++k) {
         whole = whole && !m->part[k].failed;
         for (size_t n = 0; n < m->part[k].count; ++n) {
             const stint *const one = &m->part[k].stint[n];
@@ -186,17 +209,27 @@ static bool add_stints(measuring *m, ovoid_component *components) {
     return whole;
 }
 
+/* Parts of a mesh in files that are measured before their stints are added up. */
+#define PARTS_AT_ONCE ((size_t)8)
+
 ovoid_status ov_components_measure(ovoid_context *context, ovoid_mesh *mesh) {
     measuring m = {.mesh = mesh, .parts = parts_of(mesh)};
+    const size_t at_once = mesh->store ? PARTS_AT_ONCE : m.parts;
+    bool whole = true;
     uint32_t *const first =
         ov_alloc(context, mesh->components, sizeof *first, "components of a mesh");
     if (!first)
         return OVOID_ERROR_MEMORY;
-    for (size_t v = mesh->vertices; v-- > 0;)
+    for (size_t v = mesh->vertices; v-- > 0;) {
+        ov_store_turn(mesh->store, v);
         first[mesh->component_of[v]] = (uint32_t)v;
+    }
     m.first = first;
-    ov_parallel(m.parts, measure_part, &m);
-    const bool whole = add_stints(&m, mesh->component);
+    for (size_t end; m.begin < m.parts; m.begin = end) {
+        end = m.parts - m.begin < at_once ? m.parts : m.begin + at_once;
+        ov_parallel(end - m.begin, measure_part, &m);
+        whole = add_stints(&m, end, mesh->component) && whole;
+    }
     free(first);
     if (!whole)
         return ov_fail(context, OVOID_ERROR_MEMORY, "no memory for the components of a mesh");

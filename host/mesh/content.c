@@ -215,6 +215,7 @@ static ovoid_status add_smooth(ovoid_context *context, const ovoid_mesh *mesh, o
         all.end = mesh->triangles - all.first < room ? mesh->triangles : all.first + room;
         ov_parallel((all.end - all.first + BLOCK - 1) / BLOCK, integrate_block, &all);
         add_all(&all, whole, outer);
+        ov_store_rest(mesh->store);
     }
 cleanup:
     free(many);

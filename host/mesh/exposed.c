@@ -1,5 +1,6 @@
 #include "mesh/exposed.h"
 
+#include "base/progress.h"
 #include "mesh/union.h"
 #include "neighbours/neighbours.h"
 
@@ -11,12 +12,15 @@
 
 /* The vertices that are not of the largest set, and the lattice cells in which a vertex may be near
  * to one of them: most vertices are in none, and most of the others in one that only their own set
- * comes near, which is soon seen. Vertices that follow one another are often in one cell. */
+ * comes near, which is soon seen. Vertices that follow one another are often in one cell. Of a mesh
+ * in files, the cells of a slab are looked at at a time, with one more on either side. */
 typedef struct minority {
     const ovoid_mesh *mesh;
     const uint32_t *set_of;
     uint32_t largest;
     size_t count;
+    double low[3], high[3]; /* of the box about them */
+    int64_t slab, slab_end; /* cells along z at hand */
     ov_grid grid;
     ov_cells about;
     uint32_t *only; /* of each cell: the one set that comes near, or SEVERAL */
@@ -29,6 +33,8 @@ static void minority_destroy(minority *m) {
     ov_grid_destroy(&m->grid);
     ov_cells_destroy(&m->about);
     free(m->only);
+    m->only = NULL;
+    m->only_capacity = 0;
 }
 
 static ovoid_status find_largest(ovoid_context *context, minority *m, size_t sets) {
@@ -36,11 +42,13 @@ static ovoid_status find_largest(ovoid_context *context, minority *m, size_t set
     size_t *const size = ov_alloc(context, sets, sizeof *size, "pieces of a surface");
     if (!size)
         return OVOID_ERROR_MEMORY;
-    for (size_t v = 0; v < m->mesh->vertices; ++v)
+    for (size_t v = 0; v < m->mesh->vertices; ++v) {
+        ov_store_turn(m->mesh->store, v);
         if (m->set_of[v] != OV_NO_SET) {
             ++size[m->set_of[v]];
             ++known;
         }
+    }
     for (size_t s = 0; s < sets; ++s)
         if (size[s] > size[m->largest])
             m->largest = (uint32_t)s;
@@ -53,21 +61,27 @@ static bool is_minor(const minority *m, size_t v) {
     return m->set_of[v] != OV_NO_SET && m->set_of[v] != m->largest;
 }
 
-static void find_box(const minority *m, double low[3], double high[3]) {
+static void find_box(minority *m) {
     for (size_t k = 0; k < 3; ++k) {
-        low[k] = INFINITY;
-        high[k] = -INFINITY;
+        m->low[k] = INFINITY;
+        m->high[k] = -INFINITY;
     }
     for (size_t v = 0; v < m->mesh->vertices; ++v) {
         double at[3];
+        ov_store_turn(m->mesh->store, v);
         if (!is_minor(m, v))
             continue;
         ov_mesh_at(m->mesh, v, at);
         for (size_t k = 0; k < 3; ++k) {
-            low[k] = fmin(low[k], at[k]);
-            high[k] = fmax(high[k], at[k]);
+            m->low[k] = fmin(m->low[k], at[k]);
+            m->high[k] = fmax(m->high[k], at[k]);
         }
     }
+}
+
+/* Whether a place is in the slab, or so many cells beside it. */
+static bool is_in_slab(const minority *m, const int32_t place[3], int64_t beside) {
+    return place[2] >= m->slab - beside && place[2] < m->slab_end + beside;
 }
 
 /* Set `set` comes near what is in the cell in the middle, or about it. */
@@ -95,29 +109,32 @@ typedef struct walk {
     bool begun;
 } walk;
 
-static bool move_on(walk *w, const ov_cells *cells, const double at[3], uint32_t set) {
-    int32_t place[3];
-    ov_cells_place(cells, at, place);
-    const bool same = w->begun && w->set == set && memcmp(place, w->place, sizeof place) == 0;
-    memcpy(w->place, place, sizeof place);
+static bool move_on(walk *w, const int32_t place[3], uint32_t set) {
+    const bool same = w->begun && w->set == set && memcmp(place, w->place, sizeof w->place) == 0;
+    memcpy(w->place, place, sizeof w->place);
     w->set = set;
     w->begun = true;
     return !same;
 }
 
-static ovoid_status gather(ovoid_context *context, minority *m, double reach) {
+/* The grid of those in the slab and beside it; expected: about how many these are. */
+static ovoid_status gather(ovoid_context *context, minority *m, double reach, size_t expected) {
     ovoid_status status = OVOID_OK;
-    double low[3], high[3], at[3];
     walk w = {.begun = false};
-    find_box(m, low, high);
-    OV_TRY(ov_grid_create(context, low, high, reach, m->count, m->mesh->vertices, &m->grid));
-    OV_TRY(ov_cells_create(context, low, m->grid.cells.edge, m->count, &m->about));
+    OV_TRY(ov_grid_create(context, m->low, m->high, reach, expected, 0, &m->grid));
+    OV_TRY(ov_cells_create(context, m->low, m->grid.cells.edge, expected, &m->about));
     for (size_t v = 0; v < m->mesh->vertices; ++v) {
+        double at[3];
+        int32_t place[3];
+        ov_store_turn(m->mesh->store, v);
         if (!is_minor(m, v))
             continue;
         ov_mesh_at(m->mesh, v, at);
+        ov_cells_place(&m->about, at, place);
+        if (!is_in_slab(m, place, 1))
+            continue;
         OV_TRY(ov_grid_add(context, &m->grid, at, (uint32_t)v));
-        if (move_on(&w, &m->about, at, m->set_of[v]))
+        if (move_on(&w, place, m->set_of[v]))
             OV_TRY(add_about(context, m, w.place, m->set_of[v]));
     }
 cleanup:
@@ -147,13 +164,43 @@ static ovoid_status tell_all(const minority *m, ov_near_found found, void *user)
     bool near = false;
     for (size_t v = 0; v < m->mesh->vertices; ++v) {
         double at[3];
+        int32_t place[3];
+        ov_store_turn(m->mesh->store, v);
         if (m->set_of[v] == OV_NO_SET)
             continue;
         ov_mesh_at(m->mesh, v, at);
-        if (move_on(&w, &m->about, at, m->set_of[v]))
+        ov_cells_place(&m->about, at, place);
+        if (!is_in_slab(m, place, 0))
+            continue;
+        if (move_on(&w, place, m->set_of[v]))
             near = may_be_near(m, w.place, m->set_of[v]);
         if (near)
             OV_TRY(tell(m, (uint32_t)v, at, found, user));
+    }
+cleanup:
+    return status;
+}
+
+/* Bytes that a vertex takes in a grid and in the cells about it; those of a slab come to four times
+ * what the mesh's store has room for. */
+#define VERTEX_BYTES 64.0
+#define SLAB_ROOMS 4.0
+
+static ovoid_status look_slab_by_slab(ovoid_context *context, minority *m, double reach,
+                                      ov_near_found found, void *user) {
+    ovoid_status status = OVOID_OK;
+    const double cells = fmin(floor((m->high[2] - m->low[2]) / reach) + 1.0, 1e9),
+                 wanted = ceil(VERTEX_BYTES * (double)m->count /
+                               (SLAB_ROOMS * (double)ov_store_room(m->mesh->store)));
+    const int64_t most = (int64_t)cells, slabs = (int64_t)fmin(wanted, cells);
+    for (int64_t n = 0; n < slabs; ++n) {
+        m->slab = n > 0 ? most * n / slabs : INT32_MIN;
+        m->slab_end = n + 1 < slabs ? most * (n + 1) / slabs : INT32_MAX;
+        if (n > 0)
+            OV_TRY(ov_progress_ask(context));
+        OV_TRY(gather(context, m, reach, m->count / (size_t)slabs));
+        OV_TRY(tell_all(m, found, user));
+        minority_destroy(m);
     }
 cleanup:
     return status;
@@ -169,8 +216,8 @@ ovoid_status ov_mesh_near_sets(ovoid_context *context, const ovoid_mesh *mesh,
     OV_TRY(find_largest(context, &m, sets));
     if (m.count == 0)
         goto cleanup;
-    OV_TRY(gather(context, &m, reach));
-    OV_TRY(tell_all(&m, found, user));
+    find_box(&m);
+    OV_TRY(look_slab_by_slab(context, &m, reach, found, user));
 cleanup:
     minority_destroy(&m);
     return status;
@@ -199,14 +246,18 @@ static void mark(const joining *j, ovoid_mesh *mesh) {
 
 /* Where vertices belong: all outer components are one set, however many they are, since it does not
  * matter which of them is near to which. */
-static uint32_t *sets_of_components(ovoid_context *context, const ovoid_mesh *mesh) {
+static ovoid_status find_sets(ovoid_context *context, const ovoid_mesh *mesh, uint32_t **set_of) {
     uint32_t first = 0;
-    uint32_t *const of = ov_alloc(context, mesh->vertices, sizeof *of, "components of a mesh");
+    const ovoid_status status = ov_store_alloc(context, mesh->store, set_of, mesh->vertices,
+                                               sizeof **set_of, "components of a mesh");
     while (first < mesh->components && !mesh->component[first].outer)
         ++first;
-    for (size_t v = 0; of && v < mesh->vertices; ++v)
-        of[v] = mesh->component[mesh->component_of[v]].outer ? first : mesh->component_of[v];
-    return of;
+    for (size_t v = 0; status == OVOID_OK && v < mesh->vertices; ++v) {
+        const uint32_t own = mesh->component_of[v];
+        ov_store_turn(mesh->store, v);
+        (*set_of)[v] = mesh->component[own].outer ? first : own;
+    }
+    return status;
 }
 
 static bool has_cavities(const ovoid_mesh *mesh) {
@@ -225,17 +276,16 @@ ovoid_status ov_mesh_expose(ovoid_context *context, ovoid_mesh *mesh) {
     if (mesh->components < 2 || !(mesh->spacing > 0.0) || !has_cavities(mesh))
         return OVOID_OK;
     j.of = ov_alloc(context, mesh->components, sizeof *j.of, "components of a mesh");
-    if (!j.of || !(set_of = sets_of_components(context, mesh))) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
+    if (!j.of)
+        return OVOID_ERROR_MEMORY;
+    OV_TRY(find_sets(context, mesh, &set_of));
     for (size_t c = 0; c < mesh->components; ++c)
         j.of[c] = (uint32_t)c;
     OV_TRY(ov_mesh_near_sets(context, mesh, set_of, mesh->components, OV_NECK * mesh->spacing, join,
                              &j));
     mark(&j, mesh);
 cleanup:
-    free(set_of);
+    ov_store_free(mesh->store, set_of);
     free(j.of);
     return status;
 }

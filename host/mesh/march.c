@@ -30,6 +30,7 @@ typedef struct piece_faces {
 
 /* What is of one mesh comes first, up to the grid; what follows may serve the next. */
 typedef struct ov_marcher {
+    ov_store *store; /* of the mesh so far; the caller's */
     const ov_body *bodies;
     const ovoid_mesh_options *options;
     const double *origin; /* of the offsets of a light mesh, else NULL */
@@ -494,15 +495,21 @@ static ovoid_status grow_vertices(ovoid_context *context, marcher *m, size_t tot
         OV_TRY(ov_grow(context, &m->offsets, &m->offsets_capacity, 3 * total, sizeof *m->offsets,
                        "vertices"));
     else
-        OV_TRY(ov_grow(context, &m->xyz, &m->xyz_capacity, 3 * total, sizeof *m->xyz, "vertices"));
+        OV_TRY(ov_store_grow(context, m->store, &m->xyz, &m->xyz_capacity, 3 * total,
+                             sizeof *m->xyz, "vertices"));
     if (!m->origin)
-        OV_TRY(ov_grow(context, &m->edge_of, &m->edge_of_capacity, total, sizeof *m->edge_of,
-                       "vertices"));
+        OV_TRY(ov_store_grow(context, m->store, &m->edge_of, &m->edge_of_capacity, total,
+                             sizeof *m->edge_of, "vertices"));
     if (!m->bare)
-        OV_TRY(ov_grow(context, &m->normals, &m->normals_capacity, 3 * total, sizeof *m->normals,
-                       "normals"));
+        OV_TRY(ov_store_grow(context, m->store, &m->normals, &m->normals_capacity, 3 * total,
+                             sizeof *m->normals, "normals"));
 cleanup:
     return status;
+}
+
+static ovoid_status grow_triangles(ovoid_context *context, marcher *m, size_t total) {
+    return ov_store_grow(context, m->store, &m->triangle, &m->triangle_capacity, 3 * total,
+                         sizeof *m->triangle, "triangles");
 }
 
 static void put_coordinate(marcher *m, size_t at, double value) {
@@ -628,13 +635,11 @@ static ovoid_status take_corners(ovoid_context *context, marcher *m) {
 static ovoid_status take_piece(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
     const size_t packs = (m->new_vertices + OV_PACK - 1) / OV_PACK;
-    const size_t corners = 3 * (m->triangles + m->new_triangles);
     cl_uint vertices = 0, triangles = 0;
     bool whole = true;
     if (m->active == 0)
         return OVOID_OK;
-    OV_TRY(ov_grow(context, &m->triangle, &m->triangle_capacity, corners, sizeof *m->triangle,
-                   "triangles"));
+    OV_TRY(grow_triangles(context, m, m->triangles + m->new_triangles));
     if (m->origin)
         OV_TRY(reserve_light(context, m, &vertices, &triangles));
     else
@@ -652,6 +657,7 @@ static ovoid_status take_piece(ovoid_context *context, marcher *m) {
     OV_TRY(m->origin ? take_light(context, m, vertices, triangles) : take_corners(context, m));
     m->vertices += m->new_vertices;
     m->triangles += m->new_triangles;
+    ov_store_rest(m->store);
 cleanup:
     return status;
 }
@@ -717,6 +723,7 @@ static void vertex_at(size_t vertex, double xyz[3], const void *user) {
 static void drop_replaced(marcher *m, const bool *replaced, uint32_t *number) {
     size_t kept = 0, triangles = 0;
     for (size_t v = 0; v < m->vertices; ++v) {
+        ov_store_turn(m->store, v);
         if (replaced[v])
             continue;
         for (size_t k = 0; k < 3; ++k) {
@@ -733,6 +740,7 @@ static void drop_replaced(marcher *m, const bool *replaced, uint32_t *number) {
     }
     for (size_t t = 0; t < m->triangles; ++t) {
         const uint32_t *const from = m->triangle + 3 * t;
+        ov_store_turn(m->store, t);
         if (replaced[from[0]])
             continue;
         for (size_t k = 0; k < 3; ++k)
@@ -750,17 +758,19 @@ static ovoid_status append_specks(ovoid_context *context, marcher *m, const ov_s
         return ov_fail(context, OVOID_ERROR_LIMIT,
                        "the mesh has more than 2^32 vertices; use a larger spacing");
     OV_TRY(grow_vertices(context, m, total));
-    OV_TRY(ov_grow(context, &m->triangle, &m->triangle_capacity, corners + 3 * specks->triangles,
-                   sizeof *m->triangle, "triangles"));
+    OV_TRY(grow_triangles(context, m, m->triangles + specks->triangles));
     for (size_t k = 0; k < 3 * specks->vertices; ++k) {
+        ov_store_turn(m->store, k);
         put_coordinate(m, 3 * m->vertices + k, specks->xyz[k]);
         if (!m->bare)
             m->normals[3 * m->vertices + k] = specks->normals[k];
     }
     if (m->edge_of)
         memcpy(m->edge_of + m->vertices, specks->edge, specks->vertices);
-    for (size_t k = 0; k < 3 * specks->triangles; ++k)
+    for (size_t k = 0; k < 3 * specks->triangles; ++k) {
+        ov_store_turn(m->store, k);
         m->triangle[corners + k] = (uint32_t)m->vertices + specks->corners[k];
+    }
     m->vertices = total;
     m->triangles += specks->triangles;
 cleanup:
@@ -769,33 +779,27 @@ cleanup:
 
 static ovoid_status add_specks(ovoid_context *context, marcher *m, size_t count) {
     ovoid_status status = OVOID_OK;
-    ov_specks specks = {0};
+    ov_specks specks = {.store = m->store};
     uint32_t *number = NULL;
-    bool *const replaced = ov_alloc(context, m->vertices, sizeof *replaced, "vertices");
-    const ov_lattice_mesh lattice = {.at = vertex_at,
-                                     .user = m,
-                                     .corners = m->triangle,
-                                     .vertices = m->vertices,
-                                     .triangles = m->triangles,
-                                     .replaced = replaced};
-    if (!replaced)
-        return OVOID_ERROR_MEMORY;
+    ov_lattice_mesh lattice = {.at = vertex_at,
+                               .user = m,
+                               .corners = m->triangle,
+                               .vertices = m->vertices,
+                               .triangles = m->triangles};
+    OV_TRY(ov_store_alloc(context, m->store, &lattice.replaced, m->vertices,
+                          sizeof *lattice.replaced, "vertices"));
     OV_TRY(ov_specks_find(context, m->bodies, count, m->options,
                           OV_MARCH_CUTOFF * m->options->isovalue, &lattice, &specks));
     m->missed = specks.missed;
     if (specks.vertices == 0)
         goto cleanup;
-    number = ov_alloc(context, m->vertices, sizeof *number, "vertices");
-    if (!number) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
+    OV_TRY(ov_store_alloc(context, m->store, &number, m->vertices, sizeof *number, "vertices"));
     m->resident = false;
-    drop_replaced(m, replaced, number);
+    drop_replaced(m, lattice.replaced, number);
     OV_TRY(append_specks(context, m, &specks));
 cleanup:
-    free(number);
-    free(replaced);
+    ov_store_free(m->store, number);
+    ov_store_free(m->store, lattice.replaced);
     ov_specks_destroy(&specks);
     return status;
 }
@@ -821,15 +825,20 @@ static void triangle_normal(const marcher *m, const uint32_t corner[3], double n
 /* Gives a vertex the mean normal of its triangles, or any unit vector if they have no area. */
 static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
     size_t missing = 0;
-    for (size_t k = 0; !m->bare && k < m->vertices; ++k)
+    double *sums = NULL;
+    for (size_t k = 0; !m->bare && k < m->vertices; ++k) {
+        ov_store_turn(m->store, k);
         missing += vanishes(m->normals + 3 * k);
+    }
     if (missing == 0)
         return OVOID_OK;
-    double *const sums = ov_alloc(context, 3 * m->vertices, sizeof *sums, "normals");
-    if (!sums)
-        return OVOID_ERROR_MEMORY;
+    const ovoid_status status =
+        ov_store_alloc(context, m->store, &sums, 3 * m->vertices, sizeof *sums, "normals");
+    if (status != OVOID_OK)
+        return status;
     for (size_t k = 0; k < m->triangles; ++k) {
         double normal[3];
+        ov_store_turn(m->store, k);
         triangle_normal(m, m->triangle + 3 * k, normal);
         for (int corner = 0; corner < 3; ++corner)
             for (int axis = 0; axis < 3; ++axis)
@@ -840,13 +849,14 @@ static ovoid_status mend_normals(ovoid_context *context, marcher *m) {
         const double *const s = sums + 3 * k;
         float *const normal = m->normals + 3 * k;
         const double length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
+        ov_store_turn(m->store, k);
         if (!vanishes(normal))
             continue;
         normal[2] = 1.0f;
         for (int axis = 0; axis < 3 && length > 0.0; ++axis)
             normal[axis] = (float)(s[axis] / length);
     }
-    free(sums);
+    ov_store_free(m->store, sums);
     return OVOID_OK;
 }
 
@@ -857,11 +867,9 @@ static void end_mesh(marcher *m) {
     for (size_t k = 0; m->faces && k < m->pieces.pieces; ++k)
         drop_faces(&m->faces[k]);
     free(m->faces);
-    free(m->xyz);
-    free(m->offsets);
-    free(m->edge_of);
-    free(m->normals);
-    free(m->triangle);
+    void *const arrays[] = {m->xyz, m->offsets, m->edge_of, m->normals, m->triangle};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k)
+        ov_store_free(m->store, arrays[k]);
     ov_pieces_destroy(&m->pieces);
     memset(m, 0, offsetof(marcher, grid));
 }
@@ -889,15 +897,6 @@ static void release_work(marcher *m) {
     memset((char *)m + offsetof(marcher, grid), 0, sizeof *m - offsetof(marcher, grid));
 }
 
-/* Gives back what growing has taken too much. */
-static void shrink(void *array_pointer, size_t bytes) {
-    void *array, *less;
-    memcpy(&array, array_pointer, sizeof array);
-    less = array && bytes > 0 ? realloc(array, bytes) : NULL;
-    if (less)
-        memcpy(array_pointer, &less, sizeof less);
-}
-
 /* Hands over what the device has of a light mesh. The next one may be a little larger. */
 static void adopt_device(marcher *m, ovoid_mesh *mesh) {
     m->placed_vertices = m->vertices + m->vertices / 8;
@@ -909,16 +908,16 @@ static void adopt_device(marcher *m, ovoid_mesh *mesh) {
     m->placed = m->corners = (ov_buffer){0};
 }
 
-/* Hands the arrays over. */
+/* Hands the arrays over, without what growing has taken too much. */
 static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh) {
-    shrink(&m->xyz, 3 * m->vertices * sizeof *m->xyz);
-    shrink(&m->offsets, 3 * m->vertices * sizeof *m->offsets);
-    shrink(&m->normals, 3 * m->vertices * sizeof *m->normals);
-    shrink(&m->triangle, 3 * m->triangles * sizeof *m->triangle);
+    ov_store_shrink(m->store, &m->xyz, 3 * m->vertices * sizeof *m->xyz);
+    ov_store_shrink(m->store, &m->offsets, 3 * m->vertices * sizeof *m->offsets);
+    ov_store_shrink(m->store, &m->normals, 3 * m->vertices * sizeof *m->normals);
+    ov_store_shrink(m->store, &m->triangle, 3 * m->triangles * sizeof *m->triangle);
     const ovoid_status status =
         m->origin ? ov_mesh_adopt_light(context, m->offsets, m->origin, m->normals, m->vertices,
                                         m->triangle, m->triangles, mesh)
-                  : ov_mesh_adopt(context, m->xyz, m->normals, m->vertices, m->triangle,
+                  : ov_mesh_adopt(context, m->store, m->xyz, m->normals, m->vertices, m->triangle,
                                   m->triangles, mesh);
     m->xyz = NULL;
     m->offsets = m->normals = NULL;
@@ -932,7 +931,10 @@ static ovoid_status adopt(ovoid_context *context, marcher *m, ovoid_mesh **mesh)
         adopt_device(m, *mesh);
     (*mesh)->edge = m->edge_of;
     m->edge_of = NULL;
-    return m->origin ? OVOID_OK : ov_mesh_expose(context, *mesh);
+    const ovoid_status exposed = m->origin ? OVOID_OK : ov_mesh_expose(context, *mesh);
+    if (exposed != OVOID_OK)
+        ovoid_mesh_destroy(mesh);
+    return exposed;
 }
 
 /* Where there are so many more pieces than ones with a surface, small pieces are tried, and ones of
@@ -986,6 +988,7 @@ typedef struct plan_of_mesh {
     const uint64_t *limit;
     const double *origin; /* of a light mesh, else NULL */
     const ov_watch *watch;
+    ov_store *store; /* NULL: in memory, as a light mesh is */
     bool specks;
     bool bare; /* without normals; light */
 } plan_of_mesh;
@@ -1011,6 +1014,7 @@ static ovoid_status march(ovoid_context *context, marcher *kept, const ov_body *
                           size_t count, const ovoid_mesh_options *options, const plan_of_mesh *how,
                           ovoid_mesh **mesh) {
     marcher own = {0}, *const m = kept ? kept : &own;
+    m->store = how->store;
     m->bodies = bodies;
     m->options = options;
     m->origin = how->origin;
@@ -1053,11 +1057,12 @@ ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_
 
 static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
 
-ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
-                            const ovoid_mesh_options *options, ovoid_mesh **mesh) {
+ovoid_status ov_mesh_bodies(ovoid_context *context, ov_store *store, const ov_body *bodies,
+                            size_t count, const ovoid_mesh_options *options, ovoid_mesh **mesh) {
     ovoid_mesh *made = NULL;
-    const ovoid_status status = march(context, NULL, bodies, count, options,
-                                      &(plan_of_mesh){.limit = piece_limit, .specks = true}, &made);
+    const ovoid_status status =
+        march(context, NULL, bodies, count, options,
+              &(plan_of_mesh){.limit = piece_limit, .store = store, .specks = true}, &made);
     if (status != OVOID_OK)
         return status;
     if (made->missed > 0)

@@ -51,11 +51,12 @@ void ov_marcher_begin(ov_marcher *marcher);
  * the lattice, is what the whole mesh would have there. */
 void ov_marcher_clip(ov_marcher *marcher, const double low[3], const double high[3]);
 
-/* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The light one knows its
- * components only after ov_mesh_finish(), so that the device can have something to do meanwhile;
- * normals: whether it is to have them. */
-ovoid_status ov_mesh_bodies(ovoid_context *context, const ov_body *bodies, size_t count,
-                            const ovoid_mesh_options *options, ovoid_mesh **mesh);
+/* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The full one is kept in
+ * the store, which may be NULL, and shares it. The light one knows its components only after
+ * ov_mesh_finish(), so that the device can have something to do meanwhile; normals: whether it is
+ * to have them. */
+ovoid_status ov_mesh_bodies(ovoid_context *context, ov_store *store, const ov_body *bodies,
+                            size_t count, const ovoid_mesh_options *options, ovoid_mesh **mesh);
 ovoid_status ov_mesh_bodies_light(ovoid_context *context, ov_marcher *marcher,
                                   const ov_body *bodies, size_t count,
                                   const ovoid_mesh_options *options, const double origin[3],

@@ -48,9 +48,25 @@ static size_t count_edges(half_edge *edges, size_t count, bool *closed) {
     return found;
 }
 
-/* Half-edges of so many, or a share of all of them, are sorted at a time. */
+/* So many half-edges, or a share of all of them, are sorted at a time; of a mesh in files no more
+ * than its store keeps in memory. */
 #define EDGES_LEAST ((size_t)1 << 18)
 #define EDGES_SHARE 4
+
+/* Triangles that follow one another have their edges under few vertices: of a block of them it is
+ * known which shares of all vertices these are in, a bit for each. */
+#define BLOCK ((size_t)1 << 10)
+#define SHARES 64
+
+typedef struct edge_check {
+    ovoid_mesh *mesh;
+    uint32_t *count;  /* half-edges of each vertex; becomes where they end */
+    uint64_t *shares; /* of each block */
+    size_t width;     /* vertices of a share */
+    size_t most;      /* half-edges at a time, */
+    size_t room;      /* and as many as one vertex may have by itself */
+    half_edge *edges;
+} edge_check;
 
 static uint32_t low_end(const uint32_t *corners, size_t k, uint32_t *high) {
     const uint32_t a = corners[k], b = corners[k % 3 == 2 ? k - 2 : k + 1];
@@ -58,76 +74,123 @@ static uint32_t low_end(const uint32_t *corners, size_t k, uint32_t *high) {
     return a < b ? a : b;
 }
 
-/* The vertices from `first` on that have no more than `most` half-edges; at least one. */
-static size_t edges_end(const ovoid_mesh *mesh, const uint32_t *count, size_t first, size_t most) {
+static size_t half_edges_of(const ovoid_mesh *mesh) {
+    return 3 * mesh->triangles;
+}
+
+/* Where the half-edges of a block end. */
+static size_t block_end(const ovoid_mesh *mesh, size_t block) {
+    const size_t end = 3 * BLOCK * (block + 1);
+    return end < half_edges_of(mesh) ? end : half_edges_of(mesh);
+}
+
+static ovoid_status count_half_edges(ovoid_context *context, edge_check *e) {
+    const ovoid_mesh *const mesh = e->mesh;
+    for (size_t block = 0; block * BLOCK < mesh->triangles; ++block) {
+        const size_t end = block_end(mesh, block);
+        ov_store_turn(mesh->store, block * BLOCK);
+        for (size_t k = 3 * BLOCK * block; k < end; ++k) {
+            uint32_t high;
+            const uint32_t low = low_end(mesh->corners, k, &high), own = ++e->count[low];
+            if (own == 0)
+                return ov_fail(context, OVOID_ERROR_LIMIT, "a vertex of a mesh has 2^32 edges");
+            e->room = own > e->room ? own : e->room; /* one vertex with more than its share */
+            e->shares[block] |= (uint64_t)1 << low / e->width;
+        }
+    }
+    return OVOID_OK;
+}
+
+/* The vertices from `first` on that have no more than so many half-edges; at least one. */
+static size_t edges_end(const edge_check *e, size_t first) {
     size_t end = first, sum = 0;
-    while (end < mesh->vertices && (end == first || sum + count[end] <= most))
-        sum += count[end++];
+    while (end < e->mesh->vertices && (end == first || sum + e->count[end] <= e->most))
+        sum += e->count[end++];
     return end;
 }
 
-/* Files the half-edges under the vertices from first to end, and counts the edges. count: how many
- * half-edges a vertex has; becomes where they end. */
-static void check_edges_of(ovoid_mesh *mesh, size_t first, size_t end, uint32_t *count,
-                           half_edge *edges) {
+/* Files the half-edges of a block that are under the vertices from first to end. */
+static void file_block(edge_check *e, size_t block, size_t first, size_t end) {
+    const uint32_t *const corners = e->mesh->corners;
+    const size_t last = block_end(e->mesh, block);
+    for (size_t k = 3 * BLOCK * block; k < last; ++k) {
+        uint32_t high;
+        const uint32_t low = low_end(corners, k, &high);
+        if (low >= first && low < end)
+            e->edges[e->count[low]++] = (half_edge)high << 1 | (corners[k] != low);
+    }
+}
+
+static uint64_t shares_between(const edge_check *e, size_t first, size_t end) {
+    const size_t low = first / e->width, high = (end - 1) / e->width;
+    const uint64_t up_to_high = UINT64_MAX >> (SHARES - 1 - high);
+    return up_to_high & UINT64_MAX << low;
+}
+
+/* Files the half-edges under the vertices from first to end, and counts the edges. */
+static void check_edges_of(edge_check *e, size_t first, size_t end) {
+    ovoid_mesh *const mesh = e->mesh;
+    const uint64_t wanted = shares_between(e, first, end);
     uint32_t sum = 0;
     for (size_t v = first; v < end; ++v) {
-        const uint32_t own = count[v];
-        count[v] = sum;
+        const uint32_t own = e->count[v];
+        e->count[v] = sum;
         sum += own;
     }
-    for (size_t k = 0; k < 3 * mesh->triangles; ++k) {
-        uint32_t high;
-        const uint32_t low = low_end(mesh->corners, k, &high);
-        if (low >= first && low < end)
-            edges[count[low]++] = (half_edge)high << 1 | (mesh->corners[k] != low);
+    for (size_t block = 0; block * BLOCK < mesh->triangles; ++block) {
+        ov_store_turn(mesh->store, block * BLOCK);
+        if (e->shares[block] & wanted)
+            file_block(e, block, first, end);
     }
     for (size_t v = first; v < end; ++v) {
         ovoid_component *const component = &mesh->component[mesh->component_of[v]];
-        const uint32_t from = v > first ? count[v - 1] : 0;
-        component->euler -= (int32_t)count_edges(edges + from, count[v] - from, &component->closed);
+        const uint32_t from = v > first ? e->count[v - 1] : 0;
+        component->euler -=
+            (int32_t)count_edges(e->edges + from, e->count[v] - from, &component->closed);
     }
+}
+
+static ovoid_status reserve_edges(ovoid_context *context, edge_check *e) {
+    ovoid_status status = OVOID_OK;
+    const ovoid_mesh *const mesh = e->mesh;
+    const size_t half_edges = half_edges_of(mesh), share = half_edges / EDGES_SHARE;
+    e->most = share > EDGES_LEAST ? share : EDGES_LEAST;
+    if (e->most > ov_store_room(mesh->store) / sizeof *e->edges)
+        e->most = ov_store_room(mesh->store) / sizeof *e->edges;
+    e->room = e->most;
+    e->width = mesh->vertices / SHARES + 1;
+    OV_TRY(ov_store_alloc(context, mesh->store, &e->count, mesh->vertices, sizeof *e->count,
+                          "edges of a mesh"));
+    OV_TRY(ov_store_alloc(context, mesh->store, &e->shares, mesh->triangles / BLOCK + 1,
+                          sizeof *e->shares, "edges of a mesh"));
+    OV_TRY(count_half_edges(context, e));
+    OV_TRY(ov_store_alloc(context, mesh->store, &e->edges,
+                          e->room < half_edges ? e->room : half_edges, sizeof *e->edges,
+                          "edges of a mesh"));
+cleanup:
+    return status;
 }
 
 /* Euler characteristics, and whether components are closed and oriented. Half-edges are sorted by
  * counting, those of a share of the vertices at a time: linear, and in little memory. */
 static ovoid_status check_edges(ovoid_context *context, ovoid_mesh *mesh) {
-    ovoid_status status = OVOID_ERROR_MEMORY;
-    const size_t half_edges = 3 * mesh->triangles, share = half_edges / EDGES_SHARE;
-    const size_t most = share > EDGES_LEAST ? share : EDGES_LEAST;
-    size_t room = most;
-    half_edge *edges = NULL;
-    uint32_t *const count = ov_alloc(context, mesh->vertices, sizeof *count, "edges of a mesh");
-    if (!count)
-        goto cleanup;
-    for (size_t k = 0; k < half_edges; ++k) {
-        uint32_t high;
-        const uint32_t own = ++count[low_end(mesh->corners, k, &high)];
-        if (own == 0) {
-            status = ov_fail(context, OVOID_ERROR_LIMIT, "a vertex of a mesh has 2^32 edges");
-            goto cleanup;
-        }
-        room = own > room ? own : room; /* one vertex with more than its share */
-    }
-    edges =
-        ov_alloc(context, room < half_edges ? room : half_edges, sizeof *edges, "edges of a mesh");
-    if (!edges)
-        goto cleanup;
+    ovoid_status status = OVOID_OK;
+    edge_check e = {.mesh = mesh};
+    OV_TRY(reserve_edges(context, &e));
     for (size_t c = 0; c < mesh->components; ++c) {
         mesh->component[c].closed = mesh->component[c].triangles > 0;
         mesh->component[c].euler =
             (int32_t)(mesh->component[c].vertices + mesh->component[c].triangles);
     }
     for (size_t first = 0, end; first < mesh->vertices; first = end) {
-        if ((status = ov_progress_ask(context)) != OVOID_OK)
-            goto cleanup;
-        end = edges_end(mesh, count, first, most);
-        check_edges_of(mesh, first, end, count, edges);
+        OV_TRY(ov_progress_ask(context));
+        end = edges_end(&e, first);
+        check_edges_of(&e, first, end);
     }
-    status = OVOID_OK;
 cleanup:
-    free(edges);
-    free(count);
+    ov_store_free(mesh->store, e.edges);
+    ov_store_free(mesh->store, e.shares);
+    ov_store_free(mesh->store, e.count);
     return status;
 }
 
@@ -142,6 +205,31 @@ static bool are_finite(const float *some, const double *others, size_t first, si
     for (size_t k = first; others && k < end; ++k)
         finite &= isfinite(others[k]) != 0;
     return finite;
+}
+
+/* The same of a mesh's arrays, whose pages are let go on the way. */
+#define STRETCH ((size_t)1 << 20)
+
+static bool are_finite_between(const ovoid_mesh *mesh, size_t first, size_t end) {
+    bool finite = true;
+    for (size_t from = first; from < end; from += STRETCH) {
+        const size_t to = end - from < STRETCH ? end : from + STRETCH;
+        finite &= are_finite(mesh->xyz ? NULL : mesh->offsets, mesh->xyz, from, to) &&
+                  are_finite(mesh->normals, NULL, from, to);
+        ov_store_rest(mesh->store);
+    }
+    return finite;
+}
+
+static bool are_corners_between(const ovoid_mesh *mesh, size_t first, size_t end) {
+    uint32_t most = 0;
+    for (size_t from = first; from < end; from += STRETCH) {
+        const size_t to = end - from < STRETCH ? end : from + STRETCH;
+        for (size_t n = from; n < to; ++n)
+            most = mesh->corners[n] > most ? mesh->corners[n] : most;
+        ov_store_rest(mesh->store);
+    }
+    return first == end || most < mesh->vertices;
 }
 
 /* A share of the arrays. */
@@ -159,12 +247,7 @@ static void check_part(size_t k, void *user) {
                  to = k + 1 < CHECK_PARTS ? vertices / CHECK_PARTS * (k + 1) : vertices;
     const size_t first = corners / CHECK_PARTS * k,
                  end = k + 1 < CHECK_PARTS ? corners / CHECK_PARTS * (k + 1) : corners;
-    uint32_t most = 0;
-    for (size_t n = first; n < end; ++n)
-        most = mesh->corners[n] > most ? mesh->corners[n] : most;
-    c->fine[k] = are_finite(mesh->xyz ? NULL : mesh->offsets, mesh->xyz, from, to) &&
-                 are_finite(mesh->normals, NULL, from, to) &&
-                 (first == end || most < mesh->vertices);
+    c->fine[k] = are_finite_between(mesh, from, to) && are_corners_between(mesh, first, end);
 }
 
 /* Says what is wrong with a mesh, if anything is. */
@@ -234,12 +317,13 @@ static ovoid_mesh *take_arrays(ovoid_context *context, const ovoid_mesh *arrays)
     ovoid_mesh *const made = ov_alloc(context, 1, sizeof *made, "a mesh");
     if (made) {
         *made = *arrays;
+        made->store = ov_store_share(arrays->store);
         return made;
     }
-    free(arrays->xyz);
-    free(arrays->offsets);
-    free(arrays->normals);
-    free(arrays->corners);
+    ov_store_free(arrays->store, arrays->xyz);
+    ov_store_free(arrays->store, arrays->offsets);
+    ov_store_free(arrays->store, arrays->normals);
+    ov_store_free(arrays->store, arrays->corners);
     return NULL;
 }
 
@@ -248,10 +332,8 @@ ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
     OV_TRY(ov_mesh_check(context, mesh));
     if (mesh->xyz && !mesh->normals)
         OV_TRY(make_normals(context, mesh));
-    mesh->component_of =
-        ov_alloc(context, mesh->vertices, sizeof *mesh->component_of, "components of a mesh");
-    if (!mesh->component_of)
-        return OVOID_ERROR_MEMORY;
+    OV_TRY(ov_store_alloc(context, mesh->store, &mesh->component_of, mesh->vertices,
+                          sizeof *mesh->component_of, "components of a mesh"));
     OV_TRY(ov_progress_ask(context));
     OV_TRY(ov_components_find(context, mesh));
     OV_TRY(ov_progress_ask(context));
@@ -265,9 +347,11 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
-                           uint32_t *corners, size_t triangles, ovoid_mesh **mesh) {
-    const ovoid_mesh arrays = {.vertices = vertices,
+ovoid_status ov_mesh_adopt(ovoid_context *context, ov_store *store, double *xyz, float *normals,
+                           size_t vertices, uint32_t *corners, size_t triangles,
+                           ovoid_mesh **mesh) {
+    const ovoid_mesh arrays = {.store = store,
+                               .vertices = vertices,
                                .triangles = triangles,
                                .xyz = xyz,
                                .normals = normals,
@@ -330,7 +414,7 @@ ovoid_status ovoid_mesh_create(ovoid_context *context, const double *xyz, const 
     }
     ov_progress_begin(context, "mesh");
     const ovoid_status status =
-        ov_mesh_adopt(context, points, directions, vertices, triples, triangles, mesh);
+        ov_mesh_adopt(context, NULL, points, directions, vertices, triples, triangles, mesh);
     ov_progress_end(context);
     return status;
 }
@@ -345,12 +429,11 @@ void ov_mesh_lighten(ovoid_mesh *mesh) {
 void ovoid_mesh_destroy(ovoid_mesh **mesh) {
     if (!mesh || !*mesh)
         return;
-    free((*mesh)->xyz);
-    free((*mesh)->offsets);
-    free((*mesh)->edge);
-    free((*mesh)->normals);
-    free((*mesh)->corners);
-    free((*mesh)->component_of);
+    void *const arrays[] = {(*mesh)->xyz,     (*mesh)->offsets, (*mesh)->edge,
+                            (*mesh)->normals, (*mesh)->corners, (*mesh)->component_of};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k)
+        ov_store_free((*mesh)->store, arrays[k]);
+    ov_store_destroy(&(*mesh)->store);
     free((*mesh)->component);
     for (size_t k = 0; k < sizeof(*mesh)->on_device / sizeof *(*mesh)->on_device; ++k)
         ov_buffer_destroy(&(*mesh)->on_device[k]);

@@ -6,12 +6,14 @@
 
 #include "base/base.h"
 #include "base/progress.h"
+#include "base/store.h"
 #include "field/field.h"
 #include "ovoid/ovoid.h"
 
 /* A light mesh, which the library keeps for itself, has offsets instead of xyz, knows nothing of
  * its edges (its components' closed and euler are 0), and may have given up its normals. */
 struct ovoid_mesh {
+    ov_store *store; /* of the arrays of vertices and triangles; NULL: they are in memory */
     size_t vertices, triangles;
     double *xyz;            /* 3 * vertices, angstrom; NULL if light */
     float *offsets;         /* 3 * vertices, angstrom from the origin; NULL unless light */
@@ -55,11 +57,12 @@ static inline void ov_mesh_centre(const ovoid_mesh *mesh, size_t triangle, doubl
         centre[k] = (at[0][k] + at[1][k] + at[2][k]) / 3.0;
 }
 
-/* Makes a mesh that takes the arrays over (they are freed on failure too): normals may be NULL.
- * Finds the components, numbered by their first vertex. OVOID_ERROR_ARGUMENT when a corner names no
- * vertex or a coordinate is not finite, OVOID_ERROR_LIMIT beyond 2^32 - 1 vertices or triangles. */
-ovoid_status ov_mesh_adopt(ovoid_context *context, double *xyz, float *normals, size_t vertices,
-                           uint32_t *corners, size_t triangles, ovoid_mesh **mesh);
+/* Makes a mesh that takes the arrays over (they are freed on failure too), and shares the store
+ * that they are in: normals may be NULL. Finds the components, numbered by their first vertex.
+ * OVOID_ERROR_ARGUMENT when a corner names no vertex or a coordinate is not finite,
+ * OVOID_ERROR_LIMIT beyond 2^32 - 1 vertices or triangles. */
+ovoid_status ov_mesh_adopt(ovoid_context *context, ov_store *store, double *xyz, float *normals,
+                           size_t vertices, uint32_t *corners, size_t triangles, ovoid_mesh **mesh);
 
 /* A light mesh: offsets from origin, and normals or NULL for none. ov_mesh_finish() is to follow,
  * which checks the arrays and finds the components, or ov_mesh_check() where nobody asks for these.

@@ -3,6 +3,7 @@
 
 #include "base/progress.h"
 #include "base/sized.h"
+#include "base/store.h"
 #include "field/field.h"
 #include "mesh/march.h"
 #include "model/ellipsoid.h"
@@ -77,16 +78,21 @@ void ov_body_of_image(const ovoid_field *field, size_t i, const ov_rigid *motion
     memcpy(body->quadric.centre, centre, sizeof centre);
 }
 
-static ov_body *bodies_of(ovoid_context *context, const ovoid_field *field) {
-    ov_body *const bodies = ov_alloc(context, field->count, sizeof *bodies, "a surface's terms");
-    for (size_t i = 0; bodies && i < field->count; ++i)
-        ov_body_of_field(field, i, &bodies[i]);
-    return bodies;
+static ovoid_status bodies_of(ovoid_context *context, ov_store *store, const ovoid_field *field,
+                              ov_body **bodies) {
+    const ovoid_status status =
+        ov_store_alloc(context, store, bodies, field->count, sizeof **bodies, "a surface's terms");
+    for (size_t i = 0; status == OVOID_OK && i < field->count; ++i) {
+        ov_store_turn(store, i);
+        ov_body_of_field(field, i, &(*bodies)[i]);
+    }
+    return status;
 }
 
 ovoid_status ovoid_field_mesh(ovoid_context *context, ovoid_field *field,
                               const ovoid_mesh_options *options, ovoid_mesh **mesh) {
     ovoid_status status = OVOID_OK;
+    ov_store *store = NULL;
     ov_body *bodies = NULL;
     ovoid_mesh_options o;
     OV_NEED(context, context);
@@ -96,13 +102,14 @@ ovoid_status ovoid_field_mesh(ovoid_context *context, ovoid_field *field,
     ov_progress_begin(context, "mesh");
     OV_TRY(ov_field_check(context, field));
     OV_TRY(ov_mesh_options_take(context, options, field, &o));
+    OV_TRY(ov_store_create(context, o.folder, &store));
     OV_TRY(ov_field_place(context, field));
-    if (!(bodies = bodies_of(context, field)))
-        OV_TRY(OVOID_ERROR_MEMORY);
+    OV_TRY(bodies_of(context, store, field, &bodies));
     OV_TRY(ov_field_check_ellipsoids(context, field, o.isovalue));
-    OV_TRY(ov_mesh_bodies(context, bodies, field->count, &o, mesh));
+    OV_TRY(ov_mesh_bodies(context, store, bodies, field->count, &o, mesh));
 cleanup:
-    free(bodies);
+    ov_store_free(store, bodies);
+    ov_store_destroy(&store);
     ov_progress_end(context);
     return status;
 }

@@ -14,11 +14,12 @@ static int by_low(const void *a, const void *b) {
 
 /* Boxes of all pieces, at the place of their first vertices. */
 static void box_pieces(void (*at)(size_t vertex, double xyz[3], const void *user), const void *user,
-                       size_t vertices, const uint32_t *root, const uint32_t *number,
-                       ov_small_piece *piece) {
+                       size_t vertices, const uint32_t *number, ov_small_pieces *pieces) {
+    const uint32_t *const root = pieces->root;
     for (size_t v = 0; v < vertices; ++v) {
-        ov_small_piece *const p = &piece[number[root[v]]];
+        ov_small_piece *const p = &pieces->piece[number[root[v]]];
         double xyz[3];
+        ov_store_turn(pieces->store, v);
         at(v, xyz, user);
         for (int axis = 0; axis < 3; ++axis) {
             p->low[axis] = root[v] == v ? xyz[axis] : fmin(p->low[axis], xyz[axis]);
@@ -40,48 +41,56 @@ static void keep_small(ov_small_pieces *pieces, double most) {
     pieces->count = kept;
 }
 
-ovoid_status ov_small_pieces_find(ovoid_context *context,
+/* Fills in the first vertices of all pieces, and numbers the pieces by these. */
+static void find_roots(size_t vertices, const uint32_t *corners, size_t triangles, uint32_t *number,
+                       ov_small_pieces *pieces) {
+    uint32_t *const root = pieces->root;
+    for (size_t v = 0; v < vertices; ++v) {
+        ov_store_turn(pieces->store, v);
+        root[v] = (uint32_t)v;
+    }
+    for (size_t t = 0; t < triangles; ++t) {
+        ov_store_turn(pieces->store, t);
+        ov_unite(root, corners[3 * t], corners[3 * t + 1]);
+        ov_unite(root, corners[3 * t], corners[3 * t + 2]);
+    }
+    for (size_t v = 0; v < vertices; ++v) {
+        ov_store_turn(pieces->store, v);
+        root[v] = ov_union_first(root, (uint32_t)v);
+        if (root[v] == v)
+            number[v] = (uint32_t)pieces->count++;
+    }
+}
+
+ovoid_status ov_small_pieces_find(ovoid_context *context, ov_store *store,
                                   void (*at)(size_t vertex, double xyz[3], const void *user),
                                   const void *user, size_t vertices, const uint32_t *corners,
                                   size_t triangles, double most, ov_small_pieces *pieces) {
+    static const char what[] = "pieces of a mesh";
     ovoid_status status = OVOID_OK;
-    uint32_t *const number = ov_alloc(context, vertices, sizeof *number, "pieces of a mesh");
-    *pieces = (ov_small_pieces){
-        .root = ov_alloc(context, vertices, sizeof *pieces->root, "pieces of a mesh")};
-    if (!number || !pieces->root) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    for (size_t v = 0; v < vertices; ++v)
-        pieces->root[v] = (uint32_t)v;
-    for (size_t t = 0; t < triangles; ++t) {
-        ov_unite(pieces->root, corners[3 * t], corners[3 * t + 1]);
-        ov_unite(pieces->root, corners[3 * t], corners[3 * t + 2]);
-    }
+    uint32_t *number = NULL;
+    *pieces = (ov_small_pieces){.store = store};
+    OV_TRY(ov_store_alloc(context, store, &number, vertices, sizeof *number, what));
+    OV_TRY(ov_store_alloc(context, store, &pieces->root, vertices, sizeof *pieces->root, what));
+    find_roots(vertices, corners, triangles, number, pieces);
+    OV_TRY(
+        ov_store_alloc(context, store, &pieces->piece, pieces->count, sizeof *pieces->piece, what));
     for (size_t v = 0; v < vertices; ++v) {
-        pieces->root[v] = ov_union_first(pieces->root, (uint32_t)v);
-        if (pieces->root[v] == v)
-            number[v] = (uint32_t)pieces->count++;
-    }
-    pieces->piece = ov_alloc(context, pieces->count, sizeof *pieces->piece, "pieces of a mesh");
-    if (!pieces->piece) {
-        status = OVOID_ERROR_MEMORY;
-        goto cleanup;
-    }
-    for (size_t v = 0; v < vertices; ++v)
+        ov_store_turn(store, v);
         pieces->piece[number[pieces->root[v]]].root = pieces->root[v];
-    box_pieces(at, user, vertices, pieces->root, number, pieces->piece);
+    }
+    box_pieces(at, user, vertices, number, pieces);
     keep_small(pieces, most);
     if (pieces->count > 0)
         qsort(pieces->piece, pieces->count, sizeof *pieces->piece, by_low);
 cleanup:
-    free(number);
+    ov_store_free(store, number);
     return status;
 }
 
 void ov_small_pieces_destroy(ov_small_pieces *pieces) {
-    free(pieces->piece);
-    free(pieces->root);
+    ov_store_free(pieces->store, pieces->piece);
+    ov_store_free(pieces->store, pieces->root);
     memset(pieces, 0, sizeof *pieces);
 }
 

@@ -4,7 +4,7 @@
 #ifndef OV_SMALL_PIECES_H
 #define OV_SMALL_PIECES_H
 
-#include "base/base.h"
+#include "base/store.h"
 
 typedef struct ov_small_piece {
     double low[3], high[3]; /* angstrom */
@@ -12,13 +12,15 @@ typedef struct ov_small_piece {
 } ov_small_piece;
 
 typedef struct ov_small_pieces {
+    ov_store *store; /* of the arrays; the caller's */
     size_t count;
     ov_small_piece *piece; /* by low[0] */
     uint32_t *root;        /* of all vertices */
 } ov_small_pieces;
 
-/* Pieces no longer than `most` along any axis, of a mesh whose vertices lie where `at` says. */
-ovoid_status ov_small_pieces_find(ovoid_context *context,
+/* Pieces no longer than `most` along any axis, of a mesh whose vertices lie where `at` says. store
+ * may be NULL. The pieces may be destroyed also after a failure. */
+ovoid_status ov_small_pieces_find(ovoid_context *context, ov_store *store,
                                   void (*at)(size_t vertex, double xyz[3], const void *user),
                                   const void *user, size_t vertices, const uint32_t *corners,
                                   size_t triangles, double most, ov_small_pieces *pieces);

@@ -296,14 +296,14 @@ static double find_crossing(const seeker *s, const double at[3], unsigned axis, 
 static ovoid_status grow_specks(seeker *s, size_t vertices, size_t triangles) {
     ovoid_status status = OVOID_OK;
     ov_specks *const made = s->specks;
-    OV_TRY(ov_grow(s->context, &made->xyz, &made->xyz_room, 3 * vertices, sizeof *made->xyz,
-                   "vertices"));
-    OV_TRY(ov_grow(s->context, &made->normals, &made->normals_room, 3 * vertices,
-                   sizeof *made->normals, "normals"));
-    OV_TRY(ov_grow(s->context, &made->edge, &made->edge_room, vertices, sizeof *made->edge,
-                   "vertices"));
-    OV_TRY(ov_grow(s->context, &made->corners, &made->corners_room, 3 * triangles,
-                   sizeof *made->corners, "triangles"));
+    OV_TRY(ov_store_grow(s->context, made->store, &made->xyz, &made->xyz_room, 3 * vertices,
+                         sizeof *made->xyz, "vertices"));
+    OV_TRY(ov_store_grow(s->context, made->store, &made->normals, &made->normals_room, 3 * vertices,
+                         sizeof *made->normals, "normals"));
+    OV_TRY(ov_store_grow(s->context, made->store, &made->edge, &made->edge_room, vertices,
+                         sizeof *made->edge, "vertices"));
+    OV_TRY(ov_store_grow(s->context, made->store, &made->corners, &made->corners_room,
+                         3 * triangles, sizeof *made->corners, "triangles"));
 cleanup:
     return status;
 }
@@ -397,8 +397,9 @@ static ovoid_status find_pieces(seeker *s) {
     if (s->have_pieces)
         return OVOID_OK;
     s->have_pieces = true;
-    return ov_small_pieces_find(s->context, mesh->at, mesh->user, mesh->vertices, mesh->corners,
-                                mesh->triangles, SMALL_STEPS * s->options->spacing, &s->pieces);
+    return ov_small_pieces_find(s->context, s->specks->store, mesh->at, mesh->user, mesh->vertices,
+                                mesh->corners, mesh->triangles, SMALL_STEPS * s->options->spacing,
+                                &s->pieces);
 }
 
 static void replace(const ov_small_piece *piece, void *user) {
@@ -425,8 +426,10 @@ static size_t replace_pieces(seeker *s) {
 
 /* From first vertices to all of their pieces. */
 static void spread_replaced(seeker *s) {
-    for (size_t v = 0; s->have_pieces && v < s->lattice->vertices; ++v)
+    for (size_t v = 0; s->have_pieces && v < s->lattice->vertices; ++v) {
+        ov_store_turn(s->specks->store, v);
         s->lattice->replaced[v] = s->lattice->replaced[s->pieces.root[v]];
+    }
 }
 
 /* ---- all of them -------------------------------------------------------------------------- */
@@ -467,9 +470,11 @@ ovoid_status ov_specks_find(ovoid_context *context, const ov_body *bodies, size_
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
-    for (size_t k = 0; k < s.terms.count; ++k)
+    for (size_t k = 0; k < s.terms.count; ++k) {
+        ov_store_turn(specks->store, k);
         if (!s.done[s.terms.term[k]])
             OV_TRY(seek(&s, k));
+    }
     spread_replaced(&s);
 cleanup:
     ov_speck_terms_destroy(&s.terms);
@@ -483,9 +488,8 @@ cleanup:
 }
 
 void ov_specks_destroy(ov_specks *specks) {
-    free(specks->xyz);
-    free(specks->normals);
-    free(specks->edge);
-    free(specks->corners);
+    void *const arrays[] = {specks->xyz, specks->normals, specks->edge, specks->corners};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; ++k)
+        ov_store_free(specks->store, arrays[k]);
     memset(specks, 0, sizeof *specks);
 }

@@ -7,6 +7,7 @@
 #ifndef OV_SPECKS_H
 #define OV_SPECKS_H
 
+#include "base/store.h"
 #include "mesh/pieces.h"
 #include "ovoid/ovoid.h"
 
@@ -16,7 +17,8 @@
 
 /* Closed meshes, appended one after another. */
 typedef struct ov_specks {
-    double *xyz; /* 3 * vertices, angstrom */
+    ov_store *store; /* of the arrays; the caller's */
+    double *xyz;     /* 3 * vertices, angstrom */
     float *normals;
     uint8_t *edge; /* as in ovoid_mesh */
     size_t vertices;

@@ -108,9 +108,11 @@ ovoid_status ov_grid_create(ovoid_context *context, const double low[3], const d
     double edge = reach; /* places are integers of 32 bit, kept well within */
     for (int k = 0; k < 3; ++k)
         edge = fmax(edge, (high[k] - low[k]) * 1e-8);
-    grid->where = ov_alloc(context, indices, sizeof *grid->where, "neighbours");
-    if (!grid->where)
-        return OVOID_ERROR_MEMORY;
+    if (indices > 0) {
+        grid->where = ov_alloc(context, indices, sizeof *grid->where, "neighbours");
+        if (!grid->where)
+            return OVOID_ERROR_MEMORY;
+    }
     return ov_cells_create(context, low, edge, expected / 8, &grid->cells);
 }
 
@@ -154,7 +156,8 @@ ovoid_status ov_grid_add(ovoid_context *context, ov_grid *grid, const double cen
     }
     ov_cell_members *cell = grid->members + number;
     OV_TRY(make_room(context, grid, cell));
-    grid->where[index] = cell->count;
+    if (grid->where)
+        grid->where[index] = cell->count;
     ov_neighbour *last = grid->pool + cell->first + cell->count++;
     for (int k = 0; k < 3; ++k)
         last->offset[k] = (float)(centre[k] - corner_of(&grid->cells, place, k));

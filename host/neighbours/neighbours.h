@@ -53,7 +53,7 @@ typedef struct ov_grid {
     size_t members_capacity;
     ov_neighbour *pool;
     size_t used, capacity;
-    uint32_t *where; /* per index: its place among its cell's members */
+    uint32_t *where; /* per index: its place among its cell's members; NULL: nobody is taken out */
 } ov_grid;
 
 /* Where so many are near, or more than so many are asked whether they are, some will do: it bounds
@@ -61,7 +61,8 @@ typedef struct ov_grid {
 #define OV_NEAR_MAX 512
 #define OV_ASKED_MAX 8192
 
-/* An empty grid for about `expected` points in the box, with indices below `indices`. */
+/* An empty grid for about `expected` points in the box, with indices below `indices`; 0: they may
+ * be any, and none is taken out again. */
 ovoid_status ov_grid_create(ovoid_context *context, const double low[3], const double high[3],
                             double reach, size_t expected, size_t indices, ov_grid *grid);
 void ov_grid_destroy(ov_grid *grid);

@@ -8,7 +8,6 @@
  * Positions are floats. Far from the origin, where these are coarse, they are relative to the
  * middle of the mesh, and the node moves them there. Colours of vertices, where there are any, are
  * linear light in 16 bits, between normals and indices. */
-#include "base/progress.h"
 #include "picture/palette.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
@@ -37,6 +36,7 @@ static void find_layout(const ovoid_mesh *mesh, const ov_colours *colours, layou
         ov_mesh_middle(mesh, l->origin);
     for (size_t i = 0; i < l->vertices; i++) {
         float at[3];
+        ov_store_turn(mesh->store, i);
         ov_mesh_float_at(mesh, i, l->origin, at);
         for (size_t axis = 0; axis < 3; axis++) {
             l->low[axis] = i == 0 ? at[axis] : fminf(l->low[axis], at[axis]);
@@ -113,21 +113,21 @@ static ovoid_status put_buffer(ovoid_context *context, ov_bytes *bytes, const ov
     const uint32_t *corners = ovoid_mesh_corners(mesh);
     for (size_t i = 0; i < l->vertices; i++) {
         float at[3];
-        OV_TRY(ov_progress_turn(context, i, l->vertices));
+        OV_TRY(ov_mesh_turn(context, mesh, i, l->vertices));
         ov_mesh_float_at(mesh, i, l->origin, at);
         for (size_t axis = 0; axis < 3; axis++)
             ov_put_f32(bytes, at[axis]);
     }
     for (size_t i = 0; i < l->vertices; i++) {
-        OV_TRY(ov_progress_turn(context, i, l->vertices));
+        OV_TRY(ov_mesh_turn(context, mesh, i, l->vertices));
         put_normal(bytes, normals + 3 * i);
     }
     for (size_t i = 0; colours && i < l->vertices; i++) {
-        OV_TRY(ov_progress_turn(context, i, l->vertices));
+        OV_TRY(ov_mesh_turn(context, mesh, i, l->vertices));
         put_colour(bytes, colours->rgb + 3 * i);
     }
     for (size_t i = 0; i < 3 * l->triangles; i++) {
-        OV_TRY(ov_progress_turn(context, i, 3 * l->triangles));
+        OV_TRY(ov_mesh_turn(context, mesh, i, 3 * l->triangles));
         ov_put_u32(bytes, corners[i]);
     }
 cleanup:

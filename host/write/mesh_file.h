@@ -12,8 +12,8 @@
 #ifndef OV_MESH_FILE_H
 #define OV_MESH_FILE_H
 
-#include "base/base.h"
-#include "ovoid/ovoid.h"
+#include "base/progress.h"
+#include "mesh/mesh.h"
 
 #include <stdio.h>
 
@@ -33,6 +33,13 @@ void ov_mesh_middle(const ovoid_mesh *mesh, double middle[3]);
 
 /* Significant digits of text that keep vertices apart. */
 int ov_mesh_digits(const ovoid_mesh *mesh);
+
+/* ov_progress_turn() in a loop over a mesh; lets pages of one in files go on the way. */
+static inline ovoid_status ov_mesh_turn(ovoid_context *context, const ovoid_mesh *mesh, size_t turn,
+                                        size_t total) {
+    ov_store_turn(mesh->store, turn);
+    return ov_progress_turn(context, turn, total);
+}
 
 /* ---- formats ------------------------------------------------------------------------------ */
 

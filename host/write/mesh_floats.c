@@ -18,15 +18,19 @@ static double edge_spacing(const ovoid_mesh *mesh, size_t vertex) {
 
 static double finest_spacing(const ovoid_mesh *mesh) {
     double finest = mesh->edge ? mesh->spacing : 0.0;
-    for (size_t v = 0; mesh->edge && v < mesh->vertices; ++v)
+    for (size_t v = 0; mesh->edge && v < mesh->vertices; ++v) {
+        ov_store_turn(mesh->store, v);
         finest = fmin(finest, edge_spacing(mesh, v));
+    }
     return finest;
 }
 
 static double furthest(const ovoid_mesh *mesh, const double origin[3]) {
     double most = 0.0;
-    for (size_t k = 0; k < 3 * mesh->vertices; ++k)
+    for (size_t k = 0; k < 3 * mesh->vertices; ++k) {
+        ov_store_turn(mesh->store, k);
         most = fmax(most, fabs(mesh->xyz[k] - origin[k % 3]));
+    }
     return most;
 }
 
@@ -52,6 +56,7 @@ void ov_mesh_middle(const ovoid_mesh *mesh, double middle[3]) {
     for (size_t axis = 0; axis < 3; ++axis) {
         double low = mesh->xyz[axis], high = low;
         for (size_t v = 1; v < mesh->vertices; ++v) {
+            ov_store_turn(mesh->store, v);
             low = fmin(low, mesh->xyz[3 * v + axis]);
             high = fmax(high, mesh->xyz[3 * v + axis]);
         }

@@ -1,5 +1,4 @@
 /* PLY, binary: "The PLY Polygon File Format" (G. Turk, 1994). */
-#include "base/progress.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -60,14 +59,14 @@ ovoid_status ov_write_ply_with(ovoid_context *context, const ovoid_mesh *mesh,
             colours && colours->difference ? "property float quality\n" : "", triangles,
             index_type(vertices));
     for (size_t i = 0; i < vertices && !ferror(stream); i++) {
-        OV_TRY(ov_progress_turn(context, i, vertices));
+        OV_TRY(ov_mesh_turn(context, mesh, i, vertices));
         put_place(&bytes, mesh, i, floats);
         for (size_t axis = 0; axis < 3; axis++)
             ov_put_f32(&bytes, normals[3 * i + axis]);
         put_colour(&bytes, colours, i);
     }
     for (size_t i = 0; i < triangles && !ferror(stream); i++) {
-        OV_TRY(ov_progress_turn(context, i, triangles));
+        OV_TRY(ov_mesh_turn(context, mesh, i, triangles));
         ov_put_u8(&bytes, 3);
         for (size_t corner = 0; corner < 3; corner++)
             ov_put_u32(&bytes, corners[3 * i + corner]);

@@ -1,6 +1,5 @@
 /* STL, binary: 80 bytes of text, a count, then per triangle its normal, its corners and two bytes
  * (3D Systems, "StereoLithography Interface Specification", 1989). */
-#include "base/progress.h"
 #include "write/bytes.h"
 #include "write/mesh_file.h"
 
@@ -45,7 +44,7 @@ ovoid_status ov_write_stl(ovoid_context *context, const ovoid_mesh *mesh, FILE *
     ov_put_text(&bytes, header, HEADER);
     ov_put_u32(&bytes, (uint32_t)triangles);
     for (size_t i = 0; i < triangles && !ferror(stream); i++) {
-        OV_TRY(ov_progress_turn(context, i, triangles));
+        OV_TRY(ov_mesh_turn(context, mesh, i, triangles));
         const double *at[3];
         double normal[3];
         for (size_t corner = 0; corner < 3; corner++)

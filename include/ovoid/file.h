@@ -24,6 +24,12 @@ OVOID_API ovoid_status ovoid_file_check(ovoid_context *context, const char *path
 OVOID_API ovoid_status ovoid_file_create(ovoid_context *context, const char *path,
                                          ovoid_file **file);
 
+/* The folder in which the bytes for `path` are until the file is whole: that of its final place,
+ * links followed. Of what is no regular file, and of "-", the folder that TMPDIR names, or /tmp. To
+ * be freed with ovoid_free(). OVOID_ERROR_IO as of ovoid_file_check(), but for the folder, which is
+ * not looked at. */
+OVOID_API ovoid_status ovoid_file_folder(ovoid_context *context, const char *path, char **folder);
+
 /* Appends `bytes` bytes, buffered. */
 OVOID_API ovoid_status ovoid_file_write(ovoid_context *context, ovoid_file *file, const void *data,
                                         size_t bytes);

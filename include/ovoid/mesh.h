@@ -30,9 +30,13 @@ typedef struct ovoid_mesh_options {
     double isovalue; /* c; 0: the field's */
     double spacing;  /* of the marching-cubes lattice, angstrom */
     ovoid_vertex_rule vertices;
+    const char *folder; /* where arrays of a mesh that become large are kept, in files without a
+                           name, as long as the mesh is there; NULL: in memory. The mesh is the
+                           same */
 } ovoid_mesh_options;
 
-/* isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices; size is sizeof *options. */
+/* isovalue 0, spacing OVOID_DEFAULT_MESH_SPACING, exact vertices, folder NULL; size is sizeof
+ * *options. */
 OVOID_API void ovoid_mesh_options_init(ovoid_mesh_options *options, size_t size);
 
 /* Marching cubes on the device over the lattice of multiples of `spacing` that covers the surface;
@@ -41,7 +45,8 @@ OVOID_API void ovoid_mesh_options_init(ovoid_mesh_options *options, size_t size)
  * last one halved; a warning counts what is smaller than a thousandth of the spacing. Time and
  * memory follow the surface, not the box. OVOID_ERROR_EMPTY when the field is nowhere above the
  * isovalue on the lattice, OVOID_ERROR_LIMIT when that would have more than 2e10 points and 1e5
- * for each Gaussian, or more than 1e12 values of Gaussians at them and 1e6 for each. */
+ * for each Gaussian, or more than 1e12 values of Gaussians at them and 1e6 for each.
+ * OVOID_ERROR_IO when the folder is not there, or has no room. */
 OVOID_API ovoid_status ovoid_field_mesh(ovoid_context *context, ovoid_field *field,
                                         const ovoid_mesh_options *options, ovoid_mesh **mesh);
 

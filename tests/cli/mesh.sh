@@ -68,6 +68,25 @@ for name in one two; do
     run "$OVOID" mesh a.xyzr -o $name.ply -q
 done
 cmp one.ply two.ply || fail "two runs should give the same mesh"
+
+# Into a pipe, whose large arrays would be elsewhere; nothing is left of these.
+mkfifo pipe.ply
+cat pipe.ply >two.ply &
+mkdir place
+run env TMPDIR="$PWD/place" "$OVOID" mesh a.xyzr -o pipe.ply -q
+expect_code 0
+wait $!
+cmp one.ply two.ply || fail "a mesh in a pipe should be the same"
+rmdir place || fail "nothing should be left in TMPDIR"
+
+# Large arrays are in the folder of the output, wherever a link to it is: where files may not be
+# long, that is what has no room.
+mkdir place
+ln -s place/three.ply link.ply
+run sh -c 'trap "" XFSZ && ulimit -f 16000 && exec "$@"' sh "$OVOID" mesh a.xyzr -o link.ply --spacing 0.02
+expect_code 4
+expect_err "in a file in folder 'place': File too large"
+rmdir place || fail "nothing should be left of a mesh without room"
 rm -f ./*.ply ./b.* model.txt
 
 refused() {

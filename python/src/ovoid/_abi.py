@@ -195,6 +195,7 @@ MeshOptions = _structure(
     ("isovalue", c_double),
     ("spacing", c_double),
     ("vertices", c_int),
+    ("folder", c_char_p),
 )
 Component = _structure(
     "ovoid_component",

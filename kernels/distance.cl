@@ -321,9 +321,11 @@ __kernel void distances(const uint count, const uint each, const uint from,
                     bz = max(max(low.z - z, z - high.z), 0.0f);
         if (use_bound && fma(bx, bx, fma(by, by, bz * bz)) >= bound)
             continue;
-        const uint after = min(leaf + 1 + NEAR_LEAVES, end_leaf);
-        for (uint near = max(leaf, first_leaf + NEAR_LEAVES) - NEAR_LEAVES;
-             near < after && leaf < end_leaf && bound > enough; ++near) {
+        const uint middle = leaf;
+        for (uint n = 0; n < 2 * NEAR_LEAVES + 1 && middle < end_leaf && bound > enough; ++n) {
+            const uint near = n & 1 ? middle - (n + 1) / 2 : middle + n / 2; /* outwards */
+            if (near < first_leaf || near >= end_leaf)                       /* below 0, too */
+                continue;
             const float found = ov_corner_distance(
                 x, y, z, triangles + (size_t)(near - first_leaf) * (OV_TRIANGLE * OV_LEAF));
             leaf = found < bound ? near : leaf;

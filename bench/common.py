@@ -57,6 +57,17 @@ def read_atoms(path):
     return [[float(word) for word in row] for row in rows]
 
 
+def read_placements(path):
+    """The placements of a file's REMARK 350 lines, three rows of four numbers each."""
+    rows = {}
+    with (gzip.open if path.endswith(".gz") else open)(path, "rt", encoding="latin-1") as lines:
+        for line in lines:
+            if line.startswith("REMARK 350   BIOMT"):
+                row, number, *values = line[18:].split()
+                rows.setdefault(int(number), {})[row] = [float(value) for value in values]
+    return [[rows[number][row] for row in "123"] for number in sorted(rows)]
+
+
 def report_of(ovoid, arguments, codes=(0,), seconds=None):
     """Runs the tool, which must exit with one of the codes, in so many seconds at most if it is
     said, and returns its report."""

@@ -247,7 +247,8 @@ class Molecule(Pictured):
             Fits the molecule in parts of at most so many atoms, from 64, so that memory follows a
             part; default: parts of 16384 where there are more than 65536 atoms.
         jobs : int, optional
-            So many parts side by side on each device; the model stays the same.
+            So many parts side by side on each device; the model stays the same. Default: one for
+            each two cores up to 4, while memory is plenty.
         l1 : mapping, optional
             Options of method l1 by their names in the C interface, such as ``{"iterations": 500}``.
         time_limit : float, optional

@@ -22,6 +22,14 @@ static uint64_t at_once(const fit_job *job) {
     return jobs * ovoid_context_device_count(job->context) * (job->shared ? ranks_count() : 1);
 }
 
+/* What is done when all parts are. */
+static const char *what_follows(const fit_job *job) {
+    if (job->options.adaptive.goal != OVOID_GOAL_TOLERANCE)
+        return job->measure ? ", and the surfaces are measured after that" : "";
+    return job->measure ? ", and the surfaces are compared and measured after that"
+                        : ", and the surfaces are compared after that";
+}
+
 /* Says how long a fit in parts takes as soon as parts tell, and what memory it has taken. */
 static void foretell(fit_job *job, const ovoid_progress *progress) {
     struct rusage usage;
@@ -35,12 +43,11 @@ static void foretell(fit_job *job, const ovoid_progress *progress) {
     if (left < LONG || getrusage(RUSAGE_SELF, &usage) != 0)
         return;
     cli_print_duration(left, time, sizeof time);
-    cli_note("%llu of %llu parts fitted in %.3g s: the others take about %s, and %s after that; "
-             "memory so far %.2g GB",
+    cli_note("%llu of %llu parts fitted in %.3g s: the others take about %s%s; memory so far %.2g "
+             "GB",
              (unsigned long long)(progress->done - job->forecast.first),
              (unsigned long long)progress->total, progress->seconds - job->forecast.began, time,
-             job->measure ? "the surfaces are compared and measured" : "the surfaces are compared",
-             (double)usage.ru_maxrss * KIB / 1e9);
+             what_follows(job), (double)usage.ru_maxrss * KIB / 1e9);
 }
 
 /* A signal ends the fit and all that it has made, the time limit the search alone. */

@@ -60,7 +60,17 @@ static ovoid_fit_options options_of(ovoid_goal goal, double value) {
     return options;
 }
 
-/* A fit, and what is measured of it where both have a surface: `distance` of the result says. */
+/* With points twice as far apart as small molecules have them: for what a search does, whatever it
+ * comes to. */
+static ovoid_fit_options quick_options_of(ovoid_goal goal, double value) {
+    ovoid_fit_options options = options_of(goal, value);
+    if (!test_small())
+        options.spacing = 0.7;
+    return options;
+}
+
+/* A fit, and what is measured of it where both have a surface: `distance` of the result says. A
+ * simulator would take minutes for distances, and so measures areas and volumes alone. */
 typedef struct outcome {
     ovoid_model *model;
     ovoid_fit_result result;
@@ -73,10 +83,11 @@ static void measure(ovoid_context *context, const ovoid_molecule *molecule,
     ovoid_measure_options_init(&measuring, sizeof measuring);
     measuring.isovalue = options->isovalue;
     measuring.spacing = options->adaptive.mesh_spacing;
+    measuring.distances = !test_simulated(context);
     ovoid_measures_init(&o->measures, sizeof o->measures);
     test_check(context, once_measure(context, molecule, o->model, &measuring, &o->measures));
-    /* The file's nine digits apart, what the fit says is what anybody measures. */
-    expect_near(o->result.distance, o->measures.deviation, 1e-4, "the distance");
+    if (measuring.distances) /* the file's nine digits apart, the fit says what anybody measures */
+        expect_near(o->result.distance, o->measures.deviation, 1e-4, "the distance");
 }
 
 static outcome fit(ovoid_context *context, const ovoid_molecule *molecule,
@@ -160,18 +171,16 @@ static void ratios(void **state) {
  * them, few would be near. */
 static void owners(void **state) {
     test_skip_simulated(*state);
-    ovoid_molecule *molecule = random_chain(*state, test_size(400, 6), 9);
-    ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.4);
-    for (uint32_t effort = 1; effort <= 2; ++effort) {
-        options.adaptive.effort = effort;
-        outcome o = fit(*state, molecule, &options);
-        ovoid_model_destroy(&o.model);
-    }
-    ovoid_molecule_destroy(&molecule);
-    molecule = random_chain(*state, test_size(100, 6), 10);
-    options = options_of(OVOID_GOAL_RATIO, 0.15);
-    options.adaptive.effort = 3;
+    ovoid_molecule *molecule = random_chain(*state, test_size(200, 6), 9);
+    ovoid_fit_options options = quick_options_of(OVOID_GOAL_TOLERANCE, 0.4);
+    options.adaptive.effort = 2;
     outcome o = fit(*state, molecule, &options);
+    ovoid_model_destroy(&o.model);
+    ovoid_molecule_destroy(&molecule);
+    molecule = random_chain(*state, test_size(60, 6), 10);
+    options = quick_options_of(OVOID_GOAL_RATIO, 0.15);
+    options.adaptive.effort = 3;
+    o = fit(*state, molecule, &options);
     ovoid_model_destroy(&o.model);
     ovoid_molecule_destroy(&molecule);
 }
@@ -201,7 +210,7 @@ static void tolerances(void **state) {
 static void tolerances_of_finer_meshes(void **state) {
     if (test_small())
         skip();
-    for (uint64_t seed = 1; seed <= 4; ++seed) {
+    for (uint64_t seed = 3; seed <= 4; ++seed) { /* these are off without a look by finer meshes */
         ovoid_molecule *molecule = random_chain(*state, 150, seed);
         const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
         ovoid_measure_options measuring;
@@ -239,7 +248,7 @@ static size_t needed(ovoid_context *context, const double *xyzr, size_t atoms, d
 static void twice_as_large_needs_twice_as_many(void **state) {
     if (test_small())
         skip();
-    enum { CHAIN = 120 };
+    enum { CHAIN = 60 };
     double xyzr[8 * CHAIN];
     ovoid_molecule *chain = random_chain(*state, CHAIN, 8);
     memcpy(xyzr, ovoid_molecule_xyzr(chain), 4 * CHAIN * sizeof *xyzr);
@@ -256,9 +265,10 @@ static void twice_as_large_needs_twice_as_many(void **state) {
 static void no_count_does_better(void **state) {
     if (test_small())
         skip();
-    ovoid_molecule *molecule = random_chain(*state, 150, 8);
+    enum { CHAIN = 80 };
+    ovoid_molecule *molecule = random_chain(*state, CHAIN, 8);
     const double tolerance = 0.4;
-    const size_t found = needed(*state, ovoid_molecule_xyzr(molecule), 150, tolerance);
+    const size_t found = needed(*state, ovoid_molecule_xyzr(molecule), CHAIN, tolerance);
     for (size_t count = found - 1; count + 6 > found; --count) {
         const ovoid_fit_options options = options_of(OVOID_GOAL_ELLIPSOIDS, (double)count);
         outcome o = fit(*state, molecule, &options);
@@ -518,23 +528,19 @@ static ovoid_molecule *random_ball(ovoid_context *context, size_t atoms, double 
     return molecule;
 }
 
-/* Merges that are off at first get several chances: without these, these two take 80. */
+/* Merges that are off at first get several chances: without these, this takes 41. */
 static void merges_get_their_chances(void **state) {
     test_skip_simulated(*state);
     if (test_small())
         skip(); /* the surface is that of the molecule alone on a fine lattice */
-    size_t count = 0;
-    for (uint64_t seed = 1; seed <= 2; ++seed) {
-        ovoid_molecule *molecule = random_ball(*state, 200, 8.8, 1.5, seed);
-        const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
-        outcome o = fit(*state, molecule, &options);
-        assert_true(o.result.reached);
-        count += o.result.ellipsoids;
-        ovoid_model_destroy(&o.model);
-        ovoid_molecule_destroy(&molecule);
-    }
-    print_message("%zu ellipsoids for 400 atoms\n", count);
-    assert_true(count <= 70);
+    ovoid_molecule *molecule = random_ball(*state, 200, 8.8, 1.5, 2);
+    const ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+    outcome o = fit(*state, molecule, &options);
+    print_message("%zu ellipsoids for 200 atoms\n", (size_t)o.result.ellipsoids);
+    assert_true(o.result.reached);
+    assert_true(o.result.ellipsoids <= 35);
+    ovoid_model_destroy(&o.model);
+    ovoid_molecule_destroy(&molecule);
 }
 
 /* ---- effort ------------------------------------------------------------------------------- */
@@ -574,11 +580,11 @@ static void the_furthest_comes_nearer(void **state) {
     if (strstr(ovoid_context_device(*state)->platform, "rusticl"))
         skip(); /* as above */
     double gain = 0.0;
-    for (unsigned seed = 20; seed < 20 + test_size(4, 1); ++seed) {
+    for (unsigned seed = 20; seed < 20 + test_size(2, 1); ++seed) {
         ovoid_molecule *molecule = random_chain(*state, test_size(120, 30), seed);
         double deviation[2];
         for (uint32_t effort = 0; effort < 2; ++effort) {
-            ovoid_fit_options options = options_of(OVOID_GOAL_RATIO, 0.1);
+            ovoid_fit_options options = quick_options_of(OVOID_GOAL_RATIO, 0.1);
             options.adaptive.effort = effort;
             outcome o = fit(*state, molecule, &options);
             assert_true(o.result.reached && fabs(o.measures.volume.error) < 2e-4);
@@ -590,7 +596,7 @@ static void the_furthest_comes_nearer(void **state) {
         gain += log(deviation[0] / deviation[1]);
         ovoid_molecule_destroy(&molecule);
     }
-    assert_true(gain > 0.2 * test_size(4, 1));
+    assert_true(gain > 0.2 * test_size(2, 1));
 }
 
 /* ---- the same bits ------------------------------------------------------------------------ */
@@ -598,8 +604,8 @@ static void the_furthest_comes_nearer(void **state) {
 static void two_fits_give_the_same_bits(void **state) {
     test_skip_simulated(*state);
     ovoid_molecule *molecule = random_chain(*state, test_size(24, 4), 6);
-    ovoid_fit_options all[] = {options_of(OVOID_GOAL_TOLERANCE, 0.4),
-                               options_of(OVOID_GOAL_ELLIPSOIDS, (double)test_size(6, 2))};
+    ovoid_fit_options all[] = {quick_options_of(OVOID_GOAL_TOLERANCE, 0.4),
+                               quick_options_of(OVOID_GOAL_ELLIPSOIDS, (double)test_size(4, 2))};
     all[1].adaptive.effort = (uint32_t)test_size(2, 1);
     for (size_t kind = 0; kind < test_size(2, 1); ++kind) {
         ovoid_model *models[3] = {0};

@@ -18,7 +18,7 @@
 
 #include <sys/stat.h>
 
-enum { ATOMS = 4, POINTS = 20, WIDTH = 40, HEIGHT = 16, NAMES = 40, FEW = 50 };
+enum { ATOMS = 4, POINTS = 20, WIDTH = 40, HEIGHT = 16, NAMES = 40, FOLLOWERS = 10, FEW = 50 };
 
 static struct {
     scratch *place;
@@ -416,24 +416,24 @@ static void try_every(const work *w, fault_kind kind, size_t step, uint64_t *wan
 
 /* The calls after some of those that leave an event behind, spread over all of them: who fails
  * there has something under way. */
-static size_t choose_followers(size_t chosen[NAMES]) {
+static size_t choose_followers(size_t chosen[FOLLOWERS]) {
     size_t all = 0, count = 0, n = 0;
     for (size_t at = 1; faults_call(at + 1); ++at)
         all += strstr(faults_call(at), "with an event") != NULL;
     for (size_t at = 1; faults_call(at + 1); ++at)
-        if (strstr(faults_call(at), "with an event") && n++ % (all / NAMES + 1) == 0)
+        if (strstr(faults_call(at), "with an event") && n++ % (all / FOLLOWERS + 1) == 0)
             chosen[count++] = at + 1;
     return count;
 }
 
 static void try_some(const work *w, fault_kind kind, size_t few, uint64_t *wanted, tally *t) {
-    size_t chosen[NAMES], after[NAMES];
+    size_t chosen[NAMES], after[FOLLOWERS];
     const size_t names = choose_calls(chosen), step = t->calls / few + 1;
     const size_t followers = choose_followers(after);
     for (size_t n = 0; n < followers; ++n)
         try_failure(w, kind, after[n], false, false, wanted, t);
     for (size_t n = 0; n < names; ++n)
-        try_failure(w, kind, chosen[n], false, true, wanted, t);
+        try_failure(w, kind, chosen[n], false, n % 2 == 0, wanted, t);
     for (size_t at = 1 + step / 2; at <= t->calls; at += step)
         try_failure(w, kind, at, true, true, wanted, t);
 }

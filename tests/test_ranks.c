@@ -148,9 +148,13 @@ static ovoid_molecule *rod(ovoid_context *context, size_t atoms) {
     return box(context, atoms, 5.0);
 }
 
+/* To a loose tolerance, and with few points and triangles: what is shared are parts, however much
+ * there is to do about each. */
 static ovoid_fit_options in_parts(uint32_t atoms) {
     ovoid_fit_options options;
     ovoid_fit_options_init(&options, sizeof options);
+    options.spacing = options.adaptive.mesh_spacing = 0.8;
+    options.adaptive.tolerance = 1.0;
     options.parts.atoms = atoms;
     return options;
 }
@@ -277,7 +281,7 @@ static void expect_times(const ovoid_context *context, uint32_t ranks, uint64_t 
 
 /* The bits of one process, each part fitted by one rank alone, and none idle. */
 static void all_ranks_come_to_the_model_of_one(void **state) {
-    ovoid_molecule *molecule = rod(*state, test_size(500, 300));
+    ovoid_molecule *molecule = rod(*state, 300);
     ovoid_fit_options options = in_parts(64);
     ovoid_fit_result result;
     ovoid_model *model = NULL;
@@ -310,12 +314,12 @@ static void all_ranks_come_to_the_model_of_one(void **state) {
 
 /* Where all parts are near each other, and the seams have to be mended. */
 static void seams_are_mended_by_all(void **state) {
-    ovoid_molecule *molecule = box(*state, 250, cbrt(2500.0));
+    ovoid_molecule *molecule = box(*state, 200, cbrt(2000.0));
     ovoid_fit_options options = in_parts(64);
     ovoid_fit_result result;
     ovoid_model *model = NULL;
     test_skip_simulated(*state);
-    options.adaptive.tolerance = 1.0;
+    options.adaptive.mesh_spacing = 0.5; /* sees what is off there */
     ovoid_fit_result_init(&result, sizeof result);
     test_check(*state, ovoid_fit(*state, molecule, &options, &model, &result));
     patches = 0;
@@ -517,7 +521,7 @@ static long length_of(const char *path) {
 /* One that is stopped stops all, with the same model of what was done; and rank 0 goes on from the
  * checkpoint for all, however many there are then. */
 static void a_stop_stops_all_and_they_resume(void **state) {
-    ovoid_molecule *molecule = rod(*state, 400);
+    ovoid_molecule *molecule = rod(*state, 300);
     ovoid_fit_options options = in_parts(64);
     ovoid_fit_result result;
     ovoid_model *model = NULL;

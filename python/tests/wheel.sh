@@ -31,16 +31,23 @@ done
 import sys
 from scikit_build_core.build import build_sdist
 build_sdist(sys.argv[1])' "$work") >/dev/null
-mkdir -p "$work/sources" "$build/sources"
+mkdir -p "$work/sources"
 tar -xzf "$work"/ovoid-*.tar.gz -C "$work/sources" --strip-components 1
 rm "$work"/ovoid-*.tar.gz
-(cd "$work/sources" && find . -type f) | while read -r file; do # their dates do not tell what changed
-    cmp -s "$work/sources/$file" "$build/sources/$file" && continue
-    mkdir -p "$(dirname "$build/sources/$file")"
-    cp "$work/sources/$file" "$build/sources/$file"
-    touch "$build/sources/$file"
-done
-$pip wheel --no-deps --no-build-isolation -w "$work" --config-settings=build-dir="$build/build" "$build/sources"
+"$python" - "$work/sources" "$build/sources" <<'PYTHON' # dates do not tell what changed
+import filecmp, pathlib, shutil, sys
+made, kept = map(pathlib.Path, sys.argv[1:])
+for file in filter(pathlib.Path.is_file, made.rglob("*")):
+    to = kept / file.relative_to(made)
+    if not (to.exists() and filecmp.cmp(file, to, shallow=False)):
+        to.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, to)
+        to.touch()
+PYTHON
+# Hardly optimised: what is asked is whether it is whole.
+$pip wheel --no-deps --no-build-isolation -w "$work" --config-settings=build-dir="$build/build" \
+    --config-settings=cmake.define.CMAKE_C_FLAGS_RELEASE=-O0 \
+    --config-settings=cmake.define.CMAKE_CXX_FLAGS_RELEASE=-O0 "$build/sources"
 wheel=$(echo "$work"/ovoid-*-py3-none-*.whl)
 [ -e "$wheel" ] || { echo "there is no wheel for all versions of Python: $(ls "$work")"; exit 1; }
 $pip install "$wheel"

@@ -1,6 +1,6 @@
 # Every model of a file in one run: --models all.
 need_device
-goal="--ellipsoids 6"
+goal="--ellipsoids 6 --spacing 0.7" # few points: nothing depends on how good it is
 
 # make_models FILE NUMBER[+]...: a PDB file of a chain of $size atoms, in each model a little longer; with a
 # + an atom more, with a - five atoms alone.

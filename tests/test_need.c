@@ -85,12 +85,44 @@ static void a_fit_is_refused(void **state) {
     assert_int_equal(ov_need_check(context, &need), is_host ? OVOID_ERROR_LIMIT : OVOID_OK);
 }
 
+/* Jobs that nobody asked for leave room: on a device with memory of its own, four times the need.
+ */
+static void jobs_leave_room(void **state) {
+    (void)state;
+    ov_device gpu = {.info = {.type = OVOID_DEVICE_GPU, .global_memory = 880000000}};
+    const ov_need four = {1000000, 10000, 4};
+    assert_true(ov_need_fits(&gpu, &four));
+    gpu.info.global_memory -= 4;
+    assert_false(ov_need_fits(&gpu, &four));
+    gpu.info.type = OVOID_DEVICE_CPU; /* its memory is the host's */
+    gpu.info.global_memory = 0;
+    assert_true(ov_need_fits(&gpu, &(ov_need){1000, 1000, 1}));
+    assert_false(ov_need_fits(&gpu, &(ov_need){(size_t)1 << 45, 1000, 1}));
+}
+
+/* Side by side where that pays, and not where it ends the process or times nothing. */
+static void company_where_it_pays(void **state) {
+    (void)state;
+    ov_device device = {.info = {.platform = "Portable Computing Language", .name = "pthread-x"}};
+    assert_int_equal(ov_device_company(&device, 1), 1);
+    assert_int_equal(ov_device_company(&device, 3), 1);
+    assert_int_equal(ov_device_company(&device, 4), 2);
+    assert_int_equal(ov_device_company(&device, 64), OVOID_DEFAULT_JOBS);
+    device.borrowed = true;
+    assert_int_equal(ov_device_company(&device, 64), 1);
+    device.borrowed = false;
+    strcpy(device.info.name, "basic-x");
+    assert_int_equal(ov_device_company(&device, 64), 1);
+    strcpy(device.info.platform, "Oclgrind");
+    strcpy(device.info.name, "x");
+    assert_int_equal(ov_device_company(&device, 64), 1);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(names_the_option),
-        cmocka_unit_test(follows_what_is_under_way),
-        cmocka_unit_test(a_process_has_its_limit),
-        cmocka_unit_test(a_fit_is_refused),
+        cmocka_unit_test(names_the_option),        cmocka_unit_test(follows_what_is_under_way),
+        cmocka_unit_test(a_process_has_its_limit), cmocka_unit_test(a_fit_is_refused),
+        cmocka_unit_test(jobs_leave_room),         cmocka_unit_test(company_where_it_pays),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

@@ -10,6 +10,11 @@
 #define THREADS_PAY 8
 #define THREADS_MOST 16
 
+size_t ov_cores(void) {
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return cores > 1 ? (size_t)cores : 1;
+}
+
 static size_t limit;
 
 void ov_parallel_limit(size_t threads) {
@@ -17,8 +22,8 @@ void ov_parallel_limit(size_t threads) {
 }
 
 static size_t threads_of(size_t count) {
-    const long cores = limit > 0 ? 0 : sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t pay = cores > CORES_EACH ? (size_t)cores / CORES_EACH : 1;
+    const size_t cores = limit > 0 ? 0 : ov_cores();
+    const size_t pay = cores > CORES_EACH ? cores / CORES_EACH : 1;
     size_t threads = limit > 0 ? limit : pay < THREADS_PAY ? pay : THREADS_PAY;
     threads = threads < THREADS_MOST ? threads : THREADS_MOST;
     return threads < count ? threads : count;

@@ -11,6 +11,9 @@
  * reads, and uses no context. */
 void ov_parallel(size_t count, void (*part)(size_t k, void *user), void *user);
 
+/* Of the machine: processors that are there; 1 where nobody says. */
+size_t ov_cores(void);
+
 /* Threads at most, in tests; 0: as many as pay. */
 void ov_parallel_limit(size_t threads);
 

@@ -2,7 +2,6 @@
 #include "device/internal.h"
 
 #include <string.h>
-#include <unistd.h>
 
 /* Cores for each thread, as drivers have threads of their own, and threads at most: each keeps
  * memory of the host and of the device. */
@@ -13,9 +12,8 @@ static bool is_basic(const ovoid_device_info *info) {
     return strcmp(info->platform, OV_POCL_PLATFORM) == 0 && strncmp(info->name, "basic", 5) == 0;
 }
 
-size_t ov_device_company(const ov_device *device) {
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t pay = cores > 0 ? (size_t)cores / CORES_EACH : 1;
+size_t ov_device_company(const ov_device *device, size_t cores) {
+    const size_t pay = cores / CORES_EACH;
     const bool simulated = strcmp(device->info.platform, OV_OCLGRIND_PLATFORM) == 0;
     if (device->borrowed || device->profile || simulated || is_basic(&device->info))
         return 1;

@@ -77,9 +77,10 @@ ovoid_status ov_selftest_brief(ovoid_context *context, char text[OV_SELFTEST_TEX
 /* The context's device, opening the default one if none is open yet. */
 ovoid_status ov_device_get(ovoid_context *context, ov_device **device);
 
-/* How many threads, each with a context and a queue of its own, pay on the device: one where its
- * launches are timed, its queue is another one's, or it does not stand more. */
-size_t ov_device_company(const ov_device *device);
+/* How many threads, each with a context and a queue of its own, pay on the device of a machine with
+ * so many cores (ov_cores()): one where its launches are timed, its queue is another one's, or it
+ * does not stand more. */
+size_t ov_device_company(const ov_device *device, size_t cores);
 
 /* Opens device n of the list of one context in another one, with a queue of its own: for a thread
  * of its own. Device 0 is the one that is open. */

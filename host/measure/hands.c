@@ -1,5 +1,6 @@
 #include "measure/hands.h"
 
+#include "base/parallel.h"
 #include "base/progress.h"
 #include "device/device.h"
 
@@ -43,7 +44,7 @@ static size_t choose_count(const ov_device *device, size_t wanted) {
         return 1;
     if (wanted > 0)
         return wanted < OV_HANDS_MOST ? wanted : OV_HANDS_MOST;
-    return ov_device_company(device);
+    return ov_device_company(device, ov_cores());
 }
 
 ovoid_status ov_hands_create(ovoid_context *context, size_t wanted, ov_hands **hands) {

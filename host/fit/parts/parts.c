@@ -1,5 +1,6 @@
 #include "fit/parts/parts.h"
 
+#include "base/parallel.h"
 #include "base/progress.h"
 #include "device/device.h"
 #include "fit/adaptive/constants.h"
@@ -124,9 +125,8 @@ static void add_results(const ov_parts *parts, ovoid_fit_result *result) {
         add_result(&parts->fit[p].result, result);
     if (parts->ellipsoids && result->verdict != OVOID_VERDICT_MISSED)
         result->verdict = OVOID_VERDICT_REACHED; /* so many were asked for */
-    if (parts
-            ->ellipsoids) /* each part's is not that of the whole, whose measures take their time */
-        result->distance = NAN;
+    if (parts->ellipsoids)
+        result->distance = NAN; /* each part's is not that of the whole, which measures tell */
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
 
@@ -406,7 +406,7 @@ static ovoid_status choose_jobs(ovoid_context *context, ov_parts *parts) {
         if (parts->partition.part[p].count > need.largest)
             need.largest = parts->partition.part[p].count;
     if (need.jobs == 0) {
-        need.jobs = ov_device_company(device);
+        need.jobs = ov_device_company(device, ov_cores());
         while (need.jobs > 1 && !ov_need_fits(device, &need))
             --need.jobs;
     }

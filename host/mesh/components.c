@@ -22,14 +22,10 @@ static size_t part_begin(const ovoid_mesh *mesh, size_t parts, size_t k) {
 /* ---- what hangs together --------------------------------------------------------------------- */
 
 /* A share of the triangles, and of the vertices. Triangles follow their vertices, so that most have
- * theirs in their own part; the others are left for later. Of a mesh in files nothing is listed,
- * and they are looked for again. */
+ * theirs in their own part; the others are left for later. */
 typedef struct stretch {
     size_t first, end;               /* triangles */
     uint32_t first_vertex, last_end; /* vertices */
-    uint32_t *left;                  /* triangles, */
-    size_t left_count, left_capacity;
-    bool failed; /* there was no memory to list them */
 } stretch;
 
 typedef struct uniting {
@@ -50,29 +46,24 @@ static bool is_within(const stretch *s, const uint32_t corner[3]) {
     return within;
 }
 
-static void leave(stretch *s, size_t triangle) {
-    s->failed = s->failed || ov_grow(NULL, &s->left, &s->left_capacity, s->left_count + 1,
-                                     sizeof *s->left, "triangles of a mesh") != OVOID_OK;
-    if (!s->failed)
-        s->left[s->left_count++] = (uint32_t)triangle;
+/* The triangles of a part whose corners are in it, or the others. */
+static void unite_those(const uniting *u, const stretch *s, bool within) {
+    const uint32_t *const corners = u->mesh->corners;
+    for (size_t t = s->first; t < s->end; ++t) {
+        ov_store_turn(u->mesh->store, t);
+        if (is_within(s, corners + 3 * t) == within)
+            unite_triangle(u->mesh->component_of, corners + 3 * t);
+    }
 }
 
 static void unite_part(size_t k, void *user) {
     uniting *const u = user;
-    stretch *const s = &u->part[k];
-    const uint32_t *const corners = u->mesh->corners;
-    uint32_t *const of = u->mesh->component_of;
+    const stretch *const s = &u->part[k];
     for (uint32_t v = s->first_vertex; v < s->last_end; ++v) {
         ov_store_turn(u->mesh->store, v);
-        of[v] = v;
+        u->mesh->component_of[v] = v;
     }
-    for (size_t t = s->first; t < s->end; ++t) {
-        ov_store_turn(u->mesh->store, t);
-        if (is_within(s, corners + 3 * t))
-            unite_triangle(of, corners + 3 * t);
-        else if (!u->mesh->store)
-            leave(s, t);
-    }
+    unite_those(u, s, true);
 }
 
 /* Where a part's first triangle begins, its vertices do. */
@@ -92,37 +83,14 @@ static void cut(uniting *u) {
     u->part[u->parts - 1].last_end = (uint32_t)mesh->vertices;
 }
 
-static void find_left(const uniting *u, const stretch *s) {
-    const uint32_t *const corners = u->mesh->corners;
-    for (size_t t = s->first; t < s->end; ++t) {
-        ov_store_turn(u->mesh->store, t);
-        if (!is_within(s, corners + 3 * t))
-            unite_triangle(u->mesh->component_of, corners + 3 * t);
-    }
-}
-
-static bool unite_left(uniting *u) {
-    bool whole = true;
-    for (size_t k = 0; k < u->parts; ++k) {
-        stretch *const s = &u->part[k];
-        whole = whole && !s->failed;
-        if (u->mesh->store)
-            find_left(u, s);
-        for (size_t n = 0; n < s->left_count; ++n)
-            unite_triangle(u->mesh->component_of, u->mesh->corners + 3 * (size_t)s->left[n]);
-        free(s->left);
-    }
-    return whole;
-}
-
 ovoid_status ov_components_find(ovoid_context *context, ovoid_mesh *mesh) {
     uint32_t *const of = mesh->component_of;
     uniting u = {.mesh = mesh, .parts = parts_of(mesh)};
     size_t count = 0;
     cut(&u);
     ov_parallel(u.parts, unite_part, &u);
-    if (!unite_left(&u))
-        return ov_fail(context, OVOID_ERROR_MEMORY, "no memory for the components of a mesh");
+    for (size_t k = 0; k < u.parts; ++k)
+        unite_those(&u, &u.part[k], false);
     for (size_t v = 0; v < mesh->vertices; ++v) {
         ov_store_turn(mesh->store, v);
         count += of[v] == v;

@@ -98,22 +98,19 @@ static void later_structures_are_taken_where_they_ask_for_nothing_new(void **sta
 
 /* A program of an earlier version: what follows its structure is something else. */
 static void earlier_structures_get_defaults(void **state) {
-    struct {
-        size_t size;
-        double isovalue;
-        double other, more; /* where spacing and the rest are today */
-    } options = {offsetof(ovoid_mesh_options, spacing), 1.0, NAN, 0.0};
+    ovoid_mesh_options options = {.size = offsetof(ovoid_mesh_options, spacing),
+                                  .isovalue = 1.0,
+                                  .spacing = NAN,
+                                  .vertices = (ovoid_vertex_rule)-1,
+                                  .folder = "/nowhere"};
     ovoid_molecule *molecule = two_atoms(*state);
     ovoid_mesh *mesh = NULL;
     assert_int_equal(offsetof(ovoid_mesh_options, spacing), 2 * sizeof(double));
-    test_check(*state, once_molecule_mesh(*state, molecule, 0.5,
-                                          (const ovoid_mesh_options *)&options, &mesh));
+    test_check(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh));
     ovoid_mesh_destroy(&mesh);
-    options.size = sizeof(ovoid_mesh_options); /* as if it were meant */
-    test_refused(
-        *state,
-        once_molecule_mesh(*state, molecule, 0.5, (const ovoid_mesh_options *)&options, &mesh),
-        OVOID_ERROR_ARGUMENT, "spacing");
+    options.size = sizeof options; /* as if it were meant */
+    test_refused(*state, once_molecule_mesh(*state, molecule, 0.5, &options, &mesh),
+                 OVOID_ERROR_ARGUMENT, "spacing");
     ovoid_molecule_destroy(&molecule);
 }
 

@@ -143,7 +143,8 @@ mkfifo ../2.xyzr
 env --default-signal=INT "$OVOID" fit ../1.xyzr ../2.xyzr --ratio 0.2 --out-dir ../made --report r.jsonl \
     >"$out" 2>"$err" &
 pid=$!
-exec 9>../2.xyzr # waits until the first is done
+exec 9>../2.xyzr # waits until the first is done,
+sleep 1          # and until it waits for what the second has: a signal just before would be late
 kill -s INT $pid
 finish
 exec 9>&-

@@ -2,7 +2,7 @@
  * How good a fit is where its parts meet: seams MOLECULE
  *
  * Fits the molecule as a whole and cut into 4 and 16 parts, to the default tolerance and by ratio
- * (0.066), and measures what lies within 5 angstrom of the seams between 4, or 16, parts beside
+ * (0.066, with effort 0 and 1), and measures what lies within 5 angstrom of the seams between 4, or 16, parts beside
  * what lies elsewhere; of the whole, too, in the same places. Prints CSV: of both surfaces, meshed
  * 0.5 angstrom apart, area and its error, volume (by points 0.5 angstrom apart) and its error, the
  * mean distance of vertices from the other surface weighted with their areas, and the deviation,
@@ -179,16 +179,24 @@ static void measure(subject *s, const char *goal, size_t parts, const ovoid_mode
     free(s->distance[MODEL]);
 }
 
-static void fit(subject *s, bool by_ratio, size_t parts) {
+static const struct {
+    const char *name;
+    ovoid_goal goal;
+    uint32_t effort;
+} goals[] = {{"default", OVOID_GOAL_TOLERANCE, 1},
+             {"ratio 0.066 effort 0", OVOID_GOAL_RATIO, 0},
+             {"ratio 0.066", OVOID_GOAL_RATIO, 1}};
+
+static void fit(subject *s, size_t goal, size_t parts) {
     ovoid_fit_options options;
     ovoid_model *model = NULL;
     ovoid_fit_options_init(&options, sizeof options);
-    options.adaptive.goal = by_ratio ? OVOID_GOAL_RATIO : OVOID_GOAL_TOLERANCE;
-    options.adaptive.effort = 0; /* as in parts: nothing is sharpened there */
+    options.adaptive.goal = goals[goal].goal;
+    options.adaptive.effort = goals[goal].effort;
     options.adaptive.ratio = RATIO;
     options.parts.atoms = parts > 1 ? (uint32_t)part_atoms(s, parts) : 0;
     check(s, ovoid_fit(s->context, s->molecule, &options, &model, NULL));
-    measure(s, by_ratio ? "ratio 0.066" : "default", parts, model);
+    measure(s, goals[goal].name, parts, model);
     ovoid_model_destroy(&model);
 }
 
@@ -212,9 +220,9 @@ int main(int argc, char **argv) {
            strrchr(argv[1], '/') ? strrchr(argv[1], '/') + 1 : argv[1]);
     puts("goal,parts,ellipsoids,seams_of,region,area,area_error,volume,volume_error,mean_distance,"
          "deviation");
-    for (int by_ratio = 0; by_ratio < 2; ++by_ratio)
+    for (size_t goal = 0; goal < sizeof goals / sizeof *goals; ++goal)
         for (size_t n = 0; n < sizeof parts / sizeof *parts; ++n)
-            fit(&s, by_ratio, parts[n]);
+            fit(&s, goal, parts[n]);
     free(s.distance[ORIGINAL]);
     ovoid_mesh_destroy(&s.mesh[ORIGINAL]);
     ovoid_field_destroy(&s.field[ORIGINAL]);

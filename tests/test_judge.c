@@ -247,6 +247,41 @@ static bool count_down(void *user) {
     return ++c->asked <= c->most;
 }
 
+/* ---- regions ------------------------------------------------------------------------------ */
+
+/* Beside a region surfaces count where they are too far off to be cut off there, and nothing counts
+ * that is hardly farther off than what is excused. */
+static void what_strays_counts(void **state) {
+    const double three[12] = {1.0, 2.0, 3.0, 1.7, 11.0, 2.0, 3.0, 1.4, 21.0, 2.0, 3.0, 1.4};
+    const double far = 10.0, error = test_size(2, 8) * 0.01;
+    ov_judge judge;
+    judge_atoms(*state, two, 2, 0.5, 1.0, &judge);
+    ov_quadric *const quadrics = quadrics_of(three, 3, 0.5);
+    judge.in_region = true;
+    judge.stray = judge.excused_times = INFINITY;
+    for (int k = 0; k < 3; ++k) {
+        judge.low[k] = two[k] - 3.0;
+        judge.high[k] = two[k] + 3.0;
+    }
+    expect_near(judgement_of(*state, &judge, quadrics, 3).deviation, 0.0, 1e-4, "beside it");
+    judge.stray = far + error;
+    expect_near(judgement_of(*state, &judge, quadrics, 3).deviation, 0.0, 1e-4, "not so far");
+    judge.stray = 4.0;
+    expect_near(judgement_of(*state, &judge, quadrics, 3).deviation, far, error, "strayed");
+    judge.excused = test_alloc(1, sizeof *judge.excused); /* the judge's now */
+    judge.excused_count = 1;
+    judge.excused_reach = 3.0;
+    *judge.excused = (ov_spot){.at = {21.0, 2.0, 3.0}, .distance = 0.4 * far};
+    judge.excused_times = 2.0;
+    expect_near(judgement_of(*state, &judge, quadrics, 3).deviation, far, error, "far more so");
+    judge.excused_times = 3.0;
+    expect_near(judgement_of(*state, &judge, quadrics, 3).deviation, 0.0, 1e-4, "excused");
+    judge.excused->at[0] -= 10.0;
+    expect_near(judgement_of(*state, &judge, quadrics, 3).deviation, far, error, "elsewhere");
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
 /* ---- one model after the other -------------------------------------------------------------- */
 
 enum { ATOMS = 40, ROOM = 200 };
@@ -488,6 +523,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_same_is_the_same),
         cmocka_unit_test(a_missing_piece),
+        cmocka_unit_test(what_strays_counts),
         cmocka_unit_test(a_grown_piece),
         cmocka_unit_test(a_filled_cavity),
         cmocka_unit_test(a_cavity_that_is_open),

@@ -332,6 +332,7 @@ static void numbers_are_shared_out(void **state) {
     test_skip_simulated(*state);
     options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
     options.adaptive.ellipsoids = (uint32_t)atoms / 7;
+    options.adaptive.effort = 0;
     ovoid_model *model = fit(*state, molecule, &options, &result);
     assert_int_equal(ovoid_model_size(model), atoms / 7);
     assert_true(result.reached);
@@ -344,6 +345,35 @@ static void numbers_are_shared_out(void **state) {
     test_refused(*state, ovoid_fit(*state, molecule, &options, &none, NULL), OVOID_ERROR_ARGUMENT,
                  "parts.atoms must be 0 or at least 64");
     assert_null(none);
+    ovoid_molecule_destroy(&molecule);
+}
+
+/* Of so many ellipsoids, too, what is off is brought near, within parts and across seams. */
+static void numbers_are_sharpened(void **state) {
+    ovoid_molecule *molecule = ball(*state, 300);
+    ovoid_fit_options options = in_parts(75, 1);
+    ovoid_fit_result result;
+    ovoid_measures before, after;
+    test_skip_simulated(*state);
+    options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+    options.adaptive.ellipsoids = 60;
+    options.adaptive.effort = 0;
+    ovoid_model *model = fit(*state, molecule, &options, &result);
+    measure(*state, molecule, model, &before);
+    ovoid_model_destroy(&model);
+    options.adaptive.effort = 1;
+    model = fit(*state, molecule, &options, &result);
+    measure(*state, molecule, model, &after);
+    print_message("within %g A instead of %g\n", after.deviation, before.deviation);
+    assert_int_equal(ovoid_model_size(model), 60);
+    assert_true(result.reached);
+    expect_near(result.distance, after.deviation, 1e-4, "distance");
+    assert_true(after.deviation <= 0.7 * before.deviation);
+    options.parts.jobs = 3;
+    ovoid_model *other = fit(*state, molecule, &options, &result);
+    expect_same_models(model, other);
+    ovoid_model_destroy(&other);
+    ovoid_model_destroy(&model);
     ovoid_molecule_destroy(&molecule);
 }
 
@@ -508,6 +538,7 @@ int main(void) {
         cmocka_unit_test(holds_across_seams),
         cmocka_unit_test(threads_do_not_disturb_each_other),
         cmocka_unit_test(numbers_are_shared_out),
+        cmocka_unit_test(numbers_are_sharpened),
         cmocka_unit_test(a_stop_hands_over_what_held),
         cmocka_unit_test(goes_on_from_a_checkpoint),
         cmocka_unit_test(a_full_disk_leaves_the_checkpoint),

@@ -486,6 +486,31 @@ static void models_are_units_and_motions(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* Of so many ellipsoids what is off is brought near within units and where images of one meet. */
+static void units_are_sharpened(void **state) {
+    const ov_rigid of[3] = {screw(0.0, 0.0), screw(1.0 / 3.0, 0.0), screw(2.0 / 3.0, 0.0)};
+    ovoid_molecule *molecule = assembly(*state, 150, 8.0, 0.0, 0.0, of, 3);
+    double deviation[2];
+    test_skip_simulated(*state);
+    for (uint32_t effort = 0; effort < 2; ++effort) {
+        ovoid_fit_options options;
+        ovoid_fit_result result;
+        ovoid_fit_options_init(&options, sizeof options);
+        options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+        options.adaptive.ellipsoids = 60;
+        options.adaptive.effort = effort;
+        ovoid_model *model = fit(*state, molecule, &options, &result);
+        assert_int_equal(ovoid_model_unit_size(model), 20);
+        deviation[effort] = measure_file(*state, molecule, model).deviation;
+        if (effort > 0)
+            expect_near(result.distance, deviation[effort], 0.1, "distance"); /* of the unit */
+        ovoid_model_destroy(&model);
+    }
+    print_message("within %g A instead of %g\n", deviation[1], deviation[0]);
+    assert_true(deviation[1] <= 0.7 * deviation[0]);
+    ovoid_molecule_destroy(&molecule);
+}
+
 static void units_stand_for_all(void **state) {
     const size_t atoms = 250;
     test_skip_simulated(*state);
@@ -600,6 +625,7 @@ int main(void) {
         cmocka_unit_test(what_is_far_is_found_in_images),
         cmocka_unit_test(what_is_of_no_unit_is_measured),
         cmocka_unit_test(models_are_units_and_motions),
+        cmocka_unit_test(units_are_sharpened),
         cmocka_unit_test(units_stand_for_all),
         cmocka_unit_test(seams_at_an_axis_are_mended),
         cmocka_unit_test(numbers_are_those_asked_for),

@@ -24,7 +24,8 @@ static uint64_t at_once(const fit_job *job) {
 
 /* What is done when all parts are. */
 static const char *what_follows(const fit_job *job) {
-    if (job->options.adaptive.goal != OVOID_GOAL_TOLERANCE)
+    const ovoid_adaptive_options *const wanted = &job->options.adaptive;
+    if (wanted->goal != OVOID_GOAL_TOLERANCE && wanted->effort == 0)
         return job->measure ? ", and the surfaces are measured after that" : "";
     return job->measure ? ", and the surfaces are compared and measured after that"
                         : ", and the surfaces are compared after that";

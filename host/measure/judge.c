@@ -139,23 +139,33 @@ bool ov_spots_near(const ov_spot *spots, size_t count, const double at[3], doubl
     return false;
 }
 
-/* Whether a vertex is where surfaces count. */
-static bool is_judged(const ov_judge *judge, const double at[3]) {
-    for (int k = 0; k < 3; ++k)
-        if (at[k] < judge->low[k] || at[k] > judge->high[k])
-            return false;
-    return !ov_spots_near(judge->excused, judge->excused_count, at, judge->excused_reach);
+/* Whether it is no wonder that a point is so far off. */
+static bool is_excused(const ov_judge *judge, const double at[3], double distance) {
+    for (size_t n = 0; n < judge->excused_count; ++n)
+        if (distance <= judge->excused_times * judge->excused[n].distance &&
+            ov_spots_near(&judge->excused[n], 1, at, judge->excused_reach))
+            return true;
+    return false;
 }
 
-/* Whether a vertex counts; *outer: as one of an outer surface. */
-static bool counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, bool *outer) {
+/* Whether a vertex is where surfaces count. */
+static bool is_judged(const ov_judge *judge, const double at[3], double distance) {
+    for (int k = 0; k < 3; ++k)
+        if ((at[k] < judge->low[k] || at[k] > judge->high[k]) && distance <= judge->stray)
+            return false;
+    return !is_excused(judge, at, distance);
+}
+
+/* Whether a vertex that is so far off counts; *outer: as one of an outer surface. */
+static bool counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, double distance,
+                   bool *outer) {
     double at[3];
     *outer = judge->whole || ov_mesh_is_exposed(mesh, vertex);
     if (!judge->in_region)
         return true;
     ov_mesh_at(mesh, vertex, at);
     *outer |= ov_spots_near(judge->wanted, judge->wanted_count, at, judge->excused_reach);
-    return is_judged(judge, at);
+    return is_judged(judge, at, distance);
 }
 
 /* Counts them alone where spots is NULL. */
@@ -163,7 +173,7 @@ static void add_spots(const ov_judge *judge, const ovoid_mesh *mesh, const float
                       double least, ov_spot *spots, size_t *count) {
     bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (distance[v] >= least && counts(judge, mesh, v, &outer) && outer) {
+        if (distance[v] >= least && counts(judge, mesh, v, distance[v], &outer) && outer) {
             if (spots) {
                 ov_mesh_at(mesh, v, spots[*count].at);
                 spots[*count].distance = distance[v];
@@ -218,7 +228,7 @@ static void judge_distances(const ov_judge *judge, const ovoid_mesh *mesh, const
                             ov_judgement *judgement) {
     bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v) {
-        if (distance[v] <= judgement->deviation || !counts(judge, mesh, v, &outer))
+        if (distance[v] <= judgement->deviation || !counts(judge, mesh, v, distance[v], &outer))
             continue; /* the deviation is never above the other */
         judgement->hausdorff = fmax(judgement->hausdorff, distance[v]);
         if (outer)
@@ -338,7 +348,8 @@ static ovoid_status look_inside(const ov_judge *judge, ov_meter *meter, ov_facet
     if (!counted)
         return OVOID_ERROR_MEMORY;
     for (size_t v = 0; v < from->mesh->vertices; ++v)
-        counted[v] = counts(judge, from->mesh, v, &outer) && outer ? distance[v] : -1.0f;
+        counted[v] =
+            counts(judge, from->mesh, v, distance[v], &outer) && outer ? distance[v] : -1.0f;
     const ovoid_status status =
         ov_bound_exceed(judge->context, meter, to, from, counted, &limits, &whole);
     free(counted);

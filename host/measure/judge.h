@@ -41,10 +41,12 @@ typedef struct ov_judge {
     double slack;           /* set by the owner, see ov_judge_spots() */
     bool whole;             /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;         /* set by the owner: only the surfaces within this box count, and not */
-    double low[3], high[3]; /* their areas: beyond it they may be cut off */
-    ov_spot *excused;       /* owned; within `excused_reach` of these it does not count either */
-    size_t excused_count;
-    double excused_reach;  /* angstrom */
+    double low[3], high[3]; /* their areas: beyond it they may be cut off, */
+    double stray;           /* unless they are farther off than that, angstrom */
+    ov_spot *excused;       /* owned; within `excused_reach` of these it does not count either, */
+    size_t excused_count;   /* unless it is more than `excused_times` as far off as they are */
+    double excused_reach;   /* angstrom */
+    double excused_times;
     const ov_spot *wanted; /* the owner's; so near to these it does in any case, in cavities too */
     size_t wanted_count;
 } ov_judge;

@@ -216,7 +216,8 @@ typedef struct ovoid_fit_result {
     ovoid_verdict verdict;
     double distance; /* largest between the outer surfaces, measured, angstrom: right to 1e-7 of the
                         molecule's half extent; NAN where it was not measured (l1, no surface, too
-                        coarse a mesh, or so many ellipsoids in parts: ovoid_measure() tells) */
+                        coarse a mesh, or so many ellipsoids in parts with effort 0:
+                        ovoid_measure() tells) */
     double sample_seconds;
     double fit_seconds;
     ovoid_l1_result l1;             /* of method l1, else NAN and OVOID_UNKNOWN */

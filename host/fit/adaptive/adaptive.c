@@ -104,14 +104,13 @@ cleanup:
 
 /* What judges are not to look at: where the first `count` of f->quadrics, which nothing is to be
  * held against, are off. */
-static ovoid_status excuse(ov_adaptive *f, size_t count, ov_judge *judge) {
+static ovoid_status excuse(ov_adaptive *f, size_t count, double least, ov_judge *judge) {
     ovoid_status status = OVOID_OK;
     ov_judgement judgement;
     size_t kept = 0;
     count = ov_adaptive_surround(f, count);
-    OV_TRY(ov_judge_spots(judge, f->quadrics, count, f->options->adaptive.tolerance,
-                          ov_tuned.spots_apart, SIZE_MAX, &judgement, &judge->excused,
-                          &judge->excused_count));
+    OV_TRY(ov_judge_spots(judge, f->quadrics, count, least, ov_tuned.spots_apart, SIZE_MAX,
+                          &judgement, &judge->excused, &judge->excused_count));
     for (size_t n = 0; n < judge->excused_count; ++n)
         if (!ov_spots_near(judge->wanted, judge->wanted_count, judge->excused[n].at,
                            2.0 * judge->excused_reach))
@@ -121,25 +120,49 @@ cleanup:
     return status;
 }
 
+/* The model at hand that others can be held against: the start or the part's own atoms. Returns how
+ * many ellipsoids. */
+static size_t take_standard(ov_adaptive *f) {
+    if (f->around.spot_count > 0) {
+        memcpy(f->quadrics, f->start->quadrics, f->start->count * sizeof *f->quadrics);
+        return f->start->count;
+    }
+    for (size_t i = 0; i < f->atoms; ++i)
+        ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &f->quadrics[i]);
+    return f->atoms;
+}
+
+/* Neighbours of so many ellipsoids are far off in places: what is off with the part's own atoms,
+ * too, counts where it is far more so, and one of its ellipsoids that has strayed counts anywhere.
+ * Of a start that is mended nothing else is to become worse. */
+static ovoid_status excuse_by_number(ov_adaptive *f, ov_judge *judge) {
+    const bool mends = f->around.spot_count > 0;
+    judge->excused_times = mends ? ov_tuned.patch_excused_times : ov_tuned.part_excused_times;
+    judge->stray = mends ? INFINITY : ov_tuned.part_stray / judge->root_2d;
+    judge->whole = true;
+    const ovoid_status status =
+        excuse(f, take_standard(f), ov_tuned.sharpen_enough / judge->root_2d, judge);
+    judge->whole = false;
+    judge->wanted_count = 0; /* walls of cavities about these places count as others do */
+    return status;
+}
+
 /* Surfaces count where the part has a say in them. What is off with its own atoms as they are is
  * none of its doing: cavities that are cut open at the end of what is about it, and what neighbours
  * left. In a start that holds but for some spots, what else seems to be off does not count as a
  * whole. */
 static ovoid_status judge_region(ov_adaptive *f, ov_judge *judge) {
-    const bool mends = f->around.spot_count > 0;
+    const ovoid_adaptive_options *const wanted = &f->options->adaptive;
     judge->in_region = true;
     judge->excused_reach = ov_tuned.part_excused / judge->root_2d;
+    judge->excused_times = judge->stray = INFINITY;
     judge->wanted = f->around.spots;
     judge->wanted_count = f->around.spot_count;
     memcpy(judge->low, f->around.low, sizeof judge->low);
     memcpy(judge->high, f->around.high, sizeof judge->high);
-    if (f->options->adaptive.goal != OVOID_GOAL_TOLERANCE)
-        return OVOID_OK;
-    if (mends)
-        memcpy(f->quadrics, f->start->quadrics, f->start->count * sizeof *f->quadrics);
-    for (size_t i = 0; i < f->atoms && !mends; ++i)
-        ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &f->quadrics[i]);
-    return excuse(f, mends ? f->start->count : f->atoms, judge);
+    if (wanted->goal == OVOID_GOAL_TOLERANCE)
+        return excuse(f, take_standard(f), wanted->tolerance, judge);
+    return wanted->effort > 0 ? excuse_by_number(f, judge) : OVOID_OK;
 }
 
 ovoid_status ov_adaptive_judge_at(ov_adaptive *f, double spacing, ov_judge *judge) {
@@ -249,7 +272,7 @@ static ovoid_status calibrate(ov_adaptive *f, size_t count, ov_judgement *judgem
         if (lost)
             break;
     }
-    if (wanted->goal != OVOID_GOAL_TOLERANCE && f->around.atoms == 0) /* a part is surveyed */
+    if (wanted->goal != OVOID_GOAL_TOLERANCE && (f->around.atoms == 0 || wanted->effort > 0))
         OV_TRY(judge(f, count, judgement));
 cleanup:
     return status;

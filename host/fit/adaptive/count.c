@@ -55,10 +55,8 @@ cleanup:
     return status;
 }
 
-/* What the surface of a part is compared with is not its own alone. */
 static bool sharpens(const ov_adaptive *f) {
-    return f->options->adaptive.effort > 0 && f->options->adaptive.steps > 0 &&
-           !ov_adaptive_is_part(f);
+    return f->options->adaptive.effort > 0 && f->options->adaptive.steps > 0;
 }
 
 /* From the starts to the last repair, under one window. */

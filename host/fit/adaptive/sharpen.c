@@ -11,16 +11,25 @@ static void multiply_amplitudes(ov_trial *t, double factor) {
         t->x[i * OV_FACTOR_PARAMETERS + OV_FACTOR_AMPLITUDE] += more;
 }
 
+static ovoid_status judge_once(ov_adaptive *f, ov_trial *t) {
+    ovoid_status status = OVOID_OK;
+    OV_TRY(ov_adaptive_judge(f, t));
+    if (t->judgement.valid && ov_adaptive_is_part(f)) /* its surfaces are cut off */
+        OV_TRY(ov_adaptive_volume(f, t->count, &t->judgement.volume_ratio));
+cleanup:
+    return status;
+}
+
 /* Judges a trial with the right volume, as the search will end with it: where the field is flat,
  * that moves the surface by more than what is gained here. */
 static ovoid_status judge(ov_adaptive *f, ov_trial *t) {
     ovoid_status status = OVOID_OK;
-    OV_TRY(ov_adaptive_judge(f, t));
+    OV_TRY(judge_once(f, t));
     for (uint32_t n = 0; n < ov_tuned.sharpen_volume_steps && t->judgement.valid &&
                          fabs(t->judgement.volume_ratio - 1.0) > ov_tuned.volume_error;
          ++n) {
         multiply_amplitudes(t, ov_judge_amplitude_factor(&f->judge, t->judgement.volume_ratio));
-        OV_TRY(ov_adaptive_judge(f, t));
+        OV_TRY(judge_once(f, t));
     }
 cleanup:
     return status;

@@ -35,16 +35,22 @@ ovoid_status ov_part_take_atoms(ovoid_context *context, const ov_parts *parts, s
     return OVOID_OK;
 }
 
+ovoid_fit_options ov_part_options(const ov_parts *parts, size_t ellipsoids) {
+    ovoid_fit_options options = *parts->options;
+    if (parts->ellipsoids) {
+        options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
+        options.adaptive.ellipsoids = (uint32_t)ellipsoids;
+    }
+    return options;
+}
+
 static ovoid_status fit_scene(ovoid_context *context, const ov_parts *parts, size_t p,
                               const ov_scene *scene, const ov_surroundings *around,
                               ov_part_fit *fit) {
     ovoid_status status = OVOID_OK;
-    ovoid_fit_options options = *parts->options;
+    const ovoid_fit_options options =
+        ov_part_options(parts, parts->ellipsoids ? parts->ellipsoids[p] : 0);
     ov_adaptive *adaptive = NULL;
-    if (parts->ellipsoids) {
-        options.adaptive.goal = OVOID_GOAL_ELLIPSOIDS;
-        options.adaptive.ellipsoids = (uint32_t)parts->ellipsoids[p];
-    }
     OV_TRY(ov_adaptive_create(context, scene->xyzr, parts->partition.part[p].count, around, false,
                               &adaptive));
     OV_TRY(ov_adaptive_reach(adaptive, &options, NULL, ov_seconds(), &fit->found, &fit->result));
@@ -86,7 +92,7 @@ ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_
     ov_survey_options wanted = {.isovalue = options->isovalue,
                                 .spacing = options->adaptive.mesh_spacing,
                                 .flat = true,
-                                .least = options->adaptive.tolerance};
+                                .least = parts->least};
     ov_scene scene = {0};
     ov_quadric *original = NULL;
     OV_TRY(ov_scene_of_cell(context, parts, p, &scene));

@@ -28,7 +28,8 @@ typedef struct ov_parts {
     ov_part_fit *fit;   /* of each part */
     size_t jobs;        /* so many parts at a time on each device */
     size_t *ellipsoids; /* of each, where their number is what is asked for; else NULL */
-    ov_found model;     /* of all of them, when they are done */
+    ov_found model;     /* of all of them, when they are done, */
+    double least;       /* which is mended where it is off by that much, angstrom */
 } ov_parts;
 
 /* Atom n of part p. */
@@ -42,6 +43,10 @@ static inline const double *ov_part_atom(const ov_parts *parts, size_t p, size_t
  * whom the caller is told. On errors and when it is stopped *fit stays as it is. */
 ovoid_status ov_part_fit_atoms(ovoid_context *context, const ov_parts *parts, size_t p, size_t done,
                                ov_part_fit *fit);
+
+/* What is asked of an ov_adaptive that is to fit `ellipsoids` of them, where it is their number
+ * that is asked for. */
+ovoid_fit_options ov_part_options(const ov_parts *parts, size_t ellipsoids);
 
 /* Adds the steps and counts of one fit to those of all. */
 void ov_part_count_work(const ovoid_fit_result *one, ovoid_fit_result *all);

@@ -1,16 +1,14 @@
 #include "fit/parts/parts.h"
 
 #include "base/parallel.h"
-#include "base/progress.h"
 #include "device/device.h"
 #include "fit/adaptive/constants.h"
 #include "fit/need.h"
 #include "fit/parts/checkpoint.h"
 #include "fit/parts/crew.h"
-#include "fit/parts/patch.h"
 #include "fit/parts/record.h"
+#include "fit/parts/seams.h"
 #include "fit/parts/sharing.h"
-#include "fit/parts/survey_bytes.h"
 #include "fit/parts/workers.h"
 
 #include <math.h>
@@ -113,6 +111,11 @@ static void add_result(const ovoid_fit_result *one, ovoid_fit_result *all) {
     ov_part_count_work(one, all);
 }
 
+/* Whether anything but the part itself is on the other side of a seam. */
+static bool meet(const ov_parts *parts) {
+    return parts->partition.count > 1 || parts->partition.images > 1;
+}
+
 static void add_results(const ov_parts *parts, ovoid_fit_result *result) {
     result->points = result->ellipsoids = result->iterations = 0;
     result->adaptive.solver_iterations = 0;
@@ -125,9 +128,29 @@ static void add_results(const ov_parts *parts, ovoid_fit_result *result) {
         add_result(&parts->fit[p].result, result);
     if (parts->ellipsoids && result->verdict != OVOID_VERDICT_MISSED)
         result->verdict = OVOID_VERDICT_REACHED; /* so many were asked for */
-    if (parts->ellipsoids)
-        result->distance = NAN; /* each part's is not that of the whole, which measures tell */
+    if (parts->ellipsoids && meet(parts))
+        result->distance = NAN; /* each part's is not that of the whole */
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
+}
+
+/* What is off by that much where parts meet is mended: the tolerance or, of so many ellipsoids, the
+ * mean of what the parts themselves were brought to. */
+static double least_of(const ov_parts *parts) {
+    double sum = 0.0;
+    size_t count = 0;
+    if (!parts->ellipsoids)
+        return parts->options->adaptive.tolerance;
+    for (size_t p = 0; p < parts->partition.count; ++p)
+        if (parts->fit[p].result.distance >= 0.0) { /* it was measured */
+            sum += parts->fit[p].result.distance;
+            ++count;
+        }
+    return count > 0 ? sum / (double)count : INFINITY;
+}
+
+static bool is_mended(const ov_parts *parts) {
+    return !parts->ellipsoids ||
+           (meet(parts) && parts->options->adaptive.effort > 0 && parts->least < INFINITY);
 }
 
 /* What the last survey of all says takes the place of what each part said. */
@@ -138,6 +161,8 @@ static void take_survey(const ov_parts *parts, const ov_survey_total *total,
         return;
     result->distance = total->deviation;
     result->ellipsoids = parts->model.count;
+    if (parts->ellipsoids)
+        return;
     result->verdict = total->deviation <= tolerance ? OVOID_VERDICT_REACHED : OVOID_VERDICT_MISSED;
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
@@ -148,10 +173,8 @@ static void take_survey(const ov_parts *parts, const ov_survey_total *total,
 typedef struct job {
     ov_parts *parts;
     bool *todo;
-    ov_part_fit *fresh;                /* of each part, until it is committed */
-    ov_survey_cell *cell, *fresh_cell; /* likewise: what the last survey of each says */
+    ov_part_fit *fresh; /* of each part, until it is committed */
     ov_checkpoint file;
-    ov_survey_total total;
 } job;
 
 static ovoid_status fit_task(ovoid_context *context, size_t part, size_t done, void *user) {
@@ -228,170 +251,19 @@ cleanup:
     return status;
 }
 
-/* ---- what seams left ------------------------------------------------------------------------- */
-
-static ovoid_status survey_task(ovoid_context *context, size_t part, size_t done, void *user) {
-    job *const j = user;
-    (void)done;
-    return ov_part_survey(context, j->parts, part, &j->fresh_cell[part]);
-}
-
-static ovoid_status survey_commit(ovoid_context *context, size_t part, void *user) {
-    job *const j = user;
-    (void)context;
-    ov_survey_cell_destroy(&j->cell[part]);
-    j->cell[part] = j->fresh_cell[part];
-    j->fresh_cell[part] = (ov_survey_cell){0};
-    return OVOID_OK;
-}
-
-static ovoid_status survey_pack(ovoid_context *context, size_t part, ov_bytes *to, void *user) {
-    const job *const j = user;
-    return ov_survey_cell_put(context, &j->fresh_cell[part], to);
-}
-
-static ovoid_status survey_unpack(ovoid_context *context, size_t part, ov_reading *from,
-                                  void *user) {
-    job *const j = user;
-    return ov_survey_cell_take(context, from, &j->fresh_cell[part]);
-}
-
-/* Surveys the cells of the parts in todo, and joins all. */
-static ovoid_status survey(ovoid_context *context, job *j) {
-    ovoid_status status = OVOID_OK;
-    const ov_partition *const cut = &j->parts->partition;
-    const ov_shared_work work = {
-        .kind = OVOID_TASK_JUDGE,
-        .work = {.todo = j->todo, .task = survey_task, .commit = survey_commit, .user = j},
-        .pack = survey_pack,
-        .unpack = survey_unpack};
-    const ov_survey_images images = {.image = cut->image,
-                                     .count = cut->images,
-                                     .spacing = j->parts->options->adaptive.mesh_spacing,
-                                     .centre = j->parts->centre};
-    ov_progress_stage(context, "measure");
-    OV_TRY(ov_ranks_work(context, j->parts->ranks, cut, j->parts->jobs, &work));
-    ov_survey_total_destroy(&j->total);
-    OV_TRY(ov_survey_join(context, j->cell, cut->count, &images, ov_tuned.spots_apart, &j->total));
-cleanup:
-    return status;
-}
-
-/* Whether something may have changed in a cell with what is in the box, there or in an image. */
-static bool is_touched(const ov_partition *cut, size_t p, const ov_box *touched) {
-    for (size_t g = 0; g < cut->images; ++g) {
-        const ov_box there = g > 0 ? ov_box_move(touched, &cut->image[g]) : *touched;
-        if (ov_boxes_near(&cut->part[p].cell, &there, cut->near))
-            return true;
-    }
-    return false;
-}
-
-/* Chooses the parts in whose cells something may have changed with what is in these boxes. */
-static void choose_touched(job *j, const ov_box *touched, size_t count) {
-    const ov_partition *const cut = &j->parts->partition;
-    for (size_t p = 0; p < cut->count; ++p) {
-        j->todo[p] = false;
-        for (size_t n = 0; n < count && !j->todo[p]; ++n)
-            j->todo[p] = is_touched(cut, p, &touched[n]);
-    }
-}
-
-/* A model, and how far it is off. */
-typedef struct mended {
-    ov_found model;
-    size_t spots;
-    double deviation;
-} mended;
-
-/* Copies the model as it is, with what the last survey says of it. */
-static ovoid_status keep(ovoid_context *context, const job *j, mended *kept) {
-    const ov_found *const model = &j->parts->model;
-    mended made = {.model = *model, .spots = j->total.spots, .deviation = j->total.deviation};
-    made.model.quadrics =
-        ov_copy(context, model->quadrics, model->count, sizeof *model->quadrics, "ellipsoids");
-    made.model.owner =
-        ov_copy(context, model->owner, j->parts->atoms, sizeof *model->owner, "owners");
-    if (!made.model.quadrics || !made.model.owner) {
-        ov_found_destroy(&made.model);
-        return OVOID_ERROR_MEMORY;
-    }
-    ov_found_destroy(&kept->model);
-    *kept = made;
-    return OVOID_OK;
-}
-
-static bool is_better(const ov_survey_total *now, const mended *before) {
-    return now->spots < before->spots ||
-           (now->spots == before->spots && now->deviation < before->deviation);
-}
-
-/* Fits patches about what is off, and surveys what that touched. */
-static ovoid_status mend(ovoid_context *context, job *j, ovoid_fit_result *result) {
-    ovoid_status status = OVOID_OK;
-    ov_box *touched = NULL;
-    size_t count = 0;
-    OV_TRY(ov_patches_mend(context, j->parts, j->parts->jobs, j->total.spot, j->total.spots,
-                           &touched, &count, result));
-    choose_touched(j, touched, count);
-    OV_TRY(survey(context, j));
-cleanup:
-    free(touched);
-    return status;
-}
-
-static void choose_all(job *j) {
-    for (size_t p = 0; p < j->parts->partition.count; ++p)
-        j->todo[p] = true;
-}
-
-/* A part is held to the surface among what lies about it. Cavities of the model that open through a
- * neck in another part are seen by a look at all of them, and are mended then; so are seams where
- * images of one part meet. The best that any round ended with is what comes out. */
-static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *result) {
-    ovoid_status status = OVOID_OK;
-    mended best = {0};
-    uint32_t n = 0;
-    choose_all(j);
-    OV_TRY(survey(context, j));
-    for (; n < ov_tuned.part_mends && j->total.spots > 0; ++n) {
-        if (n > 0 && !is_better(&j->total, &best))
-            break;
-        OV_TRY(keep(context, j, &best));
-        OV_TRY(mend(context, j, result));
-    }
-    if (n > 0 && !is_better(&j->total, &best)) {
-        ov_found_destroy(&j->parts->model);
-        j->parts->model = best.model;
-        best.model = (ov_found){0};
-        choose_all(j);
-        OV_TRY(survey(context, j));
-    }
-cleanup:
-    ov_found_destroy(&best.model);
-    return status;
-}
-
 /* ---- the whole ------------------------------------------------------------------------------- */
 
 static void destroy(ov_parts *parts, job *j) {
     for (size_t p = 0; p < parts->partition.count; ++p) {
         if (parts->fit)
             ov_found_destroy(&parts->fit[p].found);
-        if (j->cell)
-            ov_survey_cell_destroy(&j->cell[p]);
         if (j->fresh)
             ov_found_destroy(&j->fresh[p].found);
-        if (j->fresh_cell)
-            ov_survey_cell_destroy(&j->fresh_cell[p]);
     }
-    ov_survey_total_destroy(&j->total);
     free(parts->fit);
-    free(j->cell);
     ov_found_destroy(&parts->model);
     free(parts->ellipsoids);
     free(j->fresh);
-    free(j->fresh_cell);
     free(j->todo);
     ov_partition_destroy(&parts->partition);
 }
@@ -430,11 +302,9 @@ static ovoid_status prepare(ovoid_context *context, ov_parts *parts, job *j) {
     OV_TRY(choose_jobs(context, parts));
     OV_TRY(share_out(context, parts));
     parts->fit = ov_alloc(context, count, sizeof *parts->fit, "parts of a molecule");
-    j->cell = ov_alloc(context, count, sizeof *j->cell, "parts of a molecule");
     j->fresh = ov_alloc(context, count, sizeof *j->fresh, "parts of a molecule");
-    j->fresh_cell = ov_alloc(context, count, sizeof *j->fresh_cell, "parts of a molecule");
     j->todo = ov_alloc(context, count, sizeof *j->todo, "parts of a molecule");
-    if (!parts->fit || !j->cell || !j->fresh || !j->fresh_cell || !j->todo)
+    if (!parts->fit || !j->fresh || !j->todo)
         status = OVOID_ERROR_MEMORY;
 cleanup:
     return status;
@@ -481,6 +351,7 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
                       .centre = images->count > 1 ? centre : NULL,
                       .partition = {.image = images->motion, .images = images->count}};
     job j = {.parts = &parts};
+    ov_survey_total total = {0};
     if (of_parts.spacing == 0.0)
         of_parts.spacing = ov_default_spacing(atoms, options->decay);
     OV_TRY(prepare(context, &parts, &j));
@@ -489,16 +360,18 @@ ovoid_status ov_parts_reach(ovoid_context *context, const double *xyzr, size_t a
     result->sample_seconds = ov_seconds() - began;
     OV_TRY(fit_all(context, &j));
     add_results(&parts, result);
+    parts.least = least_of(&parts);
     OV_TRY(put_together(context, &parts));
-    if (options->adaptive.goal == OVOID_GOAL_TOLERANCE) {
-        OV_TRY(mend_all(context, &j, result));
-        take_survey(&parts, &j.total, result);
+    if (is_mended(&parts)) {
+        OV_TRY(ov_seams_mend(context, &parts, &total, result));
+        take_survey(&parts, &total, result);
     }
     hand_over(&parts, found);
 cleanup:
     if (status == OVOID_ERROR_CANCELLED && parts.fit)
         rescue(context, &parts, found, result);
     ov_crew_end(context);
+    ov_survey_total_destroy(&total);
     destroy(&parts, &j);
     return status;
 }

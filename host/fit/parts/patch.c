@@ -192,6 +192,7 @@ static ovoid_status fit_patch(ovoid_context *context, const patches *all, patch 
                               const ov_chosen *chosen, const ov_found *start, size_t done) {
     ovoid_status status = OVOID_OK;
     const ov_parts *const parts = all->parts;
+    const ovoid_fit_options options = ov_part_options(parts, one->ellipsoids);
     ov_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     ov_scene scene = {0};
     ov_rigid *images = NULL;
@@ -209,7 +210,7 @@ static ovoid_status fit_patch(ovoid_context *context, const patches *all, patch 
     around.spot_count = one->spots;
     OV_TRY(list_images(context, parts, &box, &around, &images));
     OV_TRY(ov_adaptive_create(context, scene.xyzr, one->atoms, &around, false, &adaptive));
-    OV_TRY(ov_adaptive_reach(adaptive, parts->options, start, ov_seconds(), &one->fit.found,
+    OV_TRY(ov_adaptive_reach(adaptive, &options, start, ov_seconds(), &one->fit.found,
                              &one->fit.result));
 cleanup:
     ov_adaptive_destroy(&adaptive);
@@ -265,11 +266,14 @@ static void forget(patch *one) {
 
 /* Whether the patch is as far off as it was, as can be where images of an ellipsoid meet at an
  * axis: each of them is refined as if the others stayed. */
-static bool is_no_better(const patch *one) {
+static bool is_no_better(const ov_parts *parts, const patch *one) {
+    const ovoid_fit_result *const result = &one->fit.result;
     double before = 0.0;
     for (size_t n = 0; n < one->spots; ++n)
         before = fmax(before, one->spot[n].distance);
-    return one->fit.result.verdict == OVOID_VERDICT_MISSED && one->fit.result.distance >= before;
+    return parts->ellipsoids
+               ? !(result->distance < before)
+               : result->verdict == OVOID_VERDICT_MISSED && result->distance >= before;
 }
 
 static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *user) {
@@ -290,7 +294,7 @@ static ovoid_status task(ovoid_context *context, size_t p, size_t done, void *us
         goto cleanup;
     OV_TRY(take_start(context, all, one, chosen, place, &start));
     status = fit_patch(context, all, one, chosen, &start, done);
-    if (status == OVOID_ERROR_EMPTY || (status == OVOID_OK && is_no_better(one))) {
+    if (status == OVOID_ERROR_EMPTY || (status == OVOID_OK && is_no_better(all->parts, one))) {
         forget(one); /* nothing of the surface is there, or it stays as it is */
         status = OVOID_OK;
     } else if (status == OVOID_OK) {

@@ -28,6 +28,10 @@ bool test_simulated(ovoid_context *context) {
     return strstr(ovoid_context_device(context)->platform, "Oclgrind") != NULL;
 }
 
+size_t test_next(ovoid_context *context, size_t n, size_t every) {
+    return n + (test_simulated(context) ? every : 1);
+}
+
 void test_skip_simulated(ovoid_context *context) {
     if (test_simulated(context))
         skip();

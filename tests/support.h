@@ -36,6 +36,9 @@ void test_refused(ovoid_context *context, ovoid_status status, ovoid_status want
 
 /* Whether a simulator executes kernels: it takes minutes for what takes a device a second. */
 bool test_simulated(ovoid_context *context);
+/* What comes after `n` where the same kernels are tried with one set of numbers after the other: of
+ * these a simulator, which is there for how work-items share memory, has only each `every`-th. */
+size_t test_next(ovoid_context *context, size_t n, size_t every);
 /* Ends a test as skipped there: one of what the host does with kernels that others run there. */
 void test_skip_simulated(ovoid_context *context);
 

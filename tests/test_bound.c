@@ -394,7 +394,7 @@ static void test_no_counterpart(void **state) {
 static void test_identical(void **state) {
     ovoid_context *const context = *state;
     shape s = {0};
-    shape_add_torus(&s, test_size(16, 6), 5.0, 1.0);
+    shape_add_torus(&s, test_size(16, 4), 5.0, 1.0);
     ovoid_mesh *a = shape_mesh(context, &s), *b = shape_mesh(context, &s);
     double of_vertices;
     const ov_bound got = bound_of(context, a, b, &of_vertices);
@@ -450,6 +450,7 @@ static void test_soup(void **state) {
 
 /* Chunks, batches and meshes that do not follow a curve make no difference. */
 static void test_chunks(void **state) {
+    test_skip_simulated(*state); /* the host divides, and so few triangles into one chunk */
     ovoid_context *const context = *state;
     const int level = test_small() ? 1 : 3;
     const double origin[3] = {0.5, 0.0, 0.0};

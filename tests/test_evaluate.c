@@ -279,7 +279,7 @@ static void error_is_the_same_at_every_extent(void **state) {
                                                                  test_alloc(3 * count, sizeof *xyz);
     double *const value = test_alloc(count, sizeof *value), *const gradient = test_alloc(
                                                                 3 * count, sizeof *gradient);
-    for (int n = 0; n < 2 * EXTENTS; ++n) {
+    for (size_t n = 0; n < 2 * EXTENTS; n = test_next(*state, n, 11)) {
         ovoid_molecule *molecule = NULL;
         place_wide(half_extents[n / 2], n % 2, xyzr, xyz, count);
         test_check(*state, ovoid_molecule_create(*state, xyzr, WIDE, &molecule));
@@ -332,7 +332,7 @@ static void points_far_outside(void **state) {
     ovoid_molecule *molecule = random_molecule(*state, xyzr);
     test_check(*state, once_molecule_field(*state, molecule, 0.5, near, 1, single, single + 1));
     assert_true(single[0] > 0.1);
-    for (int n = 0; n < 2 * OUT * 3; ++n) {
+    for (size_t n = 0; n < 2 * OUT * 3; n = test_next(*state, n, 17)) {
         const double far = n % 2 ? out[n / 6] : -out[n / 6];
         double xyz[12] = {far, far, far, 0.0, 0.0, 0.0, 100.0, 100.0, 100.0};
         xyz[3 + n / 2 % 3] = far;

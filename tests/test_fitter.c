@@ -543,7 +543,7 @@ static void each_question_stops(void **state) {
         ovoid_model_destroy(&model);
         const unsigned asked = questions_of(*state, fitter, &goals[n], &model);
         ovoid_model_destroy(&model);
-        for (unsigned at = 1; at <= asked; at += 1 + asked / 24, ++tried) {
+        for (unsigned at = 1; at <= asked; at += 1 + asked / 16, ++tried) {
             held += expect_stop(*state, molecule, fitter, &goals[n], at);
             if (tried % 4 == 0)
                 expect_as_many(*state, fitter, &goals[n], asked, alone);

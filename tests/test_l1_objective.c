@@ -125,8 +125,8 @@ static void lists_follow_moving_ellipsoids(void **state) {
     const size_t terms = test_size(12, 4), count = test_size(2500, 150), steps = test_size(80, 10);
     const double side = test_size(140, 79) / 10.0; /* so that no pack ends early */
     const double half[3] = {side, side, side};
-    for (int how = 0; how < MOTIONS; ++how) {
-        test_random random = {10 + (uint64_t)how};
+    for (size_t how = DRIFT; how < MOTIONS; how = test_next(*state, how, ALL)) {
+        test_random random = {10 + how};
         ov_samples samples;
         ov_l1_objective objective;
         ov_l1_evaluation result;
@@ -276,9 +276,9 @@ static void gradient_equals_central_differences(void **state) {
     const double limits[] = {1.2, INFINITY, 1.2};
     enum { TERMS = 3 };
     const size_t count = test_size(400, 40);
-    for (int kind = 0; kind < SHAPES; ++kind)
+    for (size_t kind = RANDOM; kind < SHAPES; kind = test_next(*state, kind, NEGATIVE))
         for (size_t n = 0; n < test_size(3, 1); ++n) {
-            test_random random = {30 + (uint64_t)kind};
+            test_random random = {30 + kind};
             const ov_l1_weights w = weights[n];
             const double limit = limits[n]; /* of targets up to 2 */
             ov_samples samples;
@@ -305,7 +305,7 @@ static void gradient_equals_central_differences(void **state) {
             }
             for (size_t j = 0; j < TERMS * SIZE; ++j) {
                 char what[64];
-                snprintf(what, sizeof what, "shape %d: component %zu of the gradient", kind, j);
+                snprintf(what, sizeof what, "shape %zu: component %zu of the gradient", kind, j);
                 expect_near(gradient[j], slope[j], 1e-4 * largest, what);
             }
             expect_near(ov_l1_sparse_term(&objective, x, TERMS), ov_twin_sparsity(x, TERMS), 1e-12,

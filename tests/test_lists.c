@@ -125,8 +125,8 @@ static void random_bench(bench *b, ovoid_context *context, model_kind kind, size
 static void lists_hold_what_terms_reach(void **state) {
     const double cutoff = 1e-5;
     const bool simulated = test_simulated(*state);
-    for (int kind = 0; kind < MODEL_KINDS; ++kind)
-        for (int grown = 0; grown <= 1; ++grown) {
+    for (size_t kind = 0; kind < MODEL_KINDS; kind = test_next(*state, kind, 3))
+        for (size_t grown = 0; grown <= 1; ++grown) {
             const double skin = grown ? 0.37 : 0.0;
             if (simulated && grown != kind % 2)
                 continue; /* to the kernels it is one more number */
@@ -134,7 +134,7 @@ static void lists_hold_what_terms_reach(void **state) {
             pairs p;
             tally t = {0};
             random_bench(&b, *state, (model_kind)kind, test_size(150, 15), test_size(6000, 700),
-                         cutoff, 40 + (uint64_t)kind);
+                         cutoff, 40 + kind);
             test_check(*state, ov_lists_build(*state, &b.lists, &b.points, &b.terms, skin));
             read_pairs(*state, &b.lists, &p);
             expect_lists(&p);
@@ -207,7 +207,7 @@ static void trees_of_every_depth(void **state) {
     const size_t packs[] = {1, 16, 17, 256, 257, 4096, 4097};
     const size_t count = test_size(sizeof packs / sizeof packs[0], 5);
     const double cutoff = 1e-4;
-    for (size_t n = 0; n < count; ++n) {
+    for (size_t n = 0; n < count; n = test_next(*state, n, 2)) {
         enum { TERMS = 40 };
         const size_t terms = test_size(TERMS, 12);
         bench b;

@@ -111,6 +111,7 @@ static void the_others_stay_and_the_whole_gains(void **state) {
 
 /* Where it has been before, with ellipsoids and packs a little elsewhere. */
 static void a_second_time_equals_a_first(void **state) {
+    test_skip_simulated(*state); /* a simulator's order is its own */
     row r;
     ov_local local = {.refiner = {.context = *state}}, fresh = {.refiner = {.context = *state}};
     row_create(&r, *state, test_size(9, 4), 0.1, 5);
@@ -145,6 +146,7 @@ static bool sees_all(const ov_local *local, const row *r, const double *x) {
 /* Those that go far from where they were meet the points there too, or they would do as they like
  * where nobody looks. */
 static void who_escapes_is_followed(void **state) {
+    test_skip_simulated(*state); /* the host follows */
     row r;
     ov_local local = {.refiner = {.context = *state}};
     row_create(&r, *state, test_size(10, 4), 0.0, 6);
@@ -165,6 +167,7 @@ static void who_escapes_is_followed(void **state) {
 
 /* All of them: the same as without choosing, but for the order of sums. */
 static void all_chosen_is_everything(void **state) {
+    test_skip_simulated(*state); /* the same kernels, of all of them */
     row r;
     ov_local local = {.refiner = {.context = *state}};
     ov_refiner refiner = {.context = *state};
@@ -213,6 +216,7 @@ static bool stop(uint32_t step, double misfit, void *user) {
 }
 
 static void cancelling_leaves_all_as_it_was(void **state) {
+    test_skip_simulated(*state); /* the host stops */
     row r;
     ov_local local = {.refiner = {.context = *state}};
     ov_refine_options options = options_of(5);

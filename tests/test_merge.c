@@ -71,7 +71,7 @@ static void expect_losses(bench *b, uint64_t seed, bool every_point, const char 
 
 static void losses_equal_twin(void **state) {
     const model_kind kinds[] = {MODEL_RANDOM, MODEL_SPHERE, MODEL_GIMBAL};
-    for (size_t n = 0; n < sizeof kinds / sizeof *kinds; ++n) {
+    for (size_t n = 0; n < sizeof kinds / sizeof *kinds; n = test_next(*state, n, 3)) {
         bench b;
         bench_random(&b, *state, kinds[n], test_size(24, 6), test_size(1500, 117), 40 + n);
         expect_losses(&b, n, true, model_kind_name(kinds[n]));
@@ -268,6 +268,7 @@ static void merge(model *m, double *x, size_t *count, size_t fewer, const uint32
 }
 
 static void merging_keeps_moments(void **state) {
+    test_skip_simulated(*state); /* the host chooses, and the losses are compared above */
     model m;
     create_model(&m, *state, test_size(40, 8), test_size(6, 20) / 10.0, 60);
     for (size_t fewer = 0; fewer <= m.count; fewer = 3 * fewer + 1) {
@@ -344,6 +345,7 @@ static void cheapest_pairs_are_merged(void **state) {
 }
 
 static void twins_stay_apart(void **state) {
+    test_skip_simulated(*state);
     model m;
     create_model(&m, *state, 6, test_size(6, 20) / 10.0, 80);
     uint32_t twin[] = {1, 0, 3, 2, 5, 4};
@@ -367,6 +369,7 @@ static void twins_stay_apart(void **state) {
 
 /* Each ellipsoid is found among the parents once. */
 static void parents_are_named(void **state) {
+    test_skip_simulated(*state);
     model m;
     const size_t count = test_size(24, 8);
     create_model(&m, *state, count, test_size(6, 20) / 10.0, 82);
@@ -442,6 +445,7 @@ static size_t merged_as(model *m, const ov_merging *merging, double (*merged)[3]
 
 /* Merges keep their distance from one another, lie where they may, and are of the cheapest. */
 static void merges_lie_where_they_may(void **state) {
+    test_skip_simulated(*state);
     model m;
     const size_t count = test_size(24, 8);
     border b = {.x = 0.0};
@@ -505,6 +509,7 @@ static void nothing_to_merge(void **state) {
 
 /* Ellipsoids at one place, more than a search for partners looks at. */
 static void crowd_at_one_point(void **state) {
+    test_skip_simulated(*state);
     model m;
     const size_t crowd = test_size(600, 8);
     create_model(&m, *state, crowd, 2.0, 82);
@@ -589,6 +594,7 @@ static void expect_split(const double *whole, const double *x, size_t i, size_t 
 }
 
 static void worst_are_split(void **state) {
+    test_skip_simulated(*state); /* the host splits */
     model m;
     create_model(&m, *state, test_size(20, 8), test_size(6, 20) / 10.0, 91);
     const size_t before = m.count, cases[] = {0, 1, 5, before, before + 4};

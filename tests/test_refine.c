@@ -166,14 +166,16 @@ static void a_mixture_is_found_again(void **state) {
     ov_refiner refiner = {.context = *state};
     problem_create(&p, *state, test_size(8, 2), 0.15, 2);
     const double before = misfit_of(&p.s, p.x);
-    const double misfit = run(&refiner, &p, options_of((uint32_t)test_size(40, 8)), &r);
+    const uint32_t steps = test_simulated(*state) ? 2 : (uint32_t)test_size(40, 8);
+    const double misfit = run(&refiner, &p, options_of(steps), &r);
     print_message("misfit %g -> %g (%g in double), %u steps, lists built %llu times for %llu "
                   "evaluations\n",
                   before, misfit, misfit_of(&p.s, p.x), r.count,
                   (unsigned long long)refiner.list_builds, (unsigned long long)refiner.evaluations);
-    assert_true(misfit < test_size(1, 100) * 1e-5 * before);
-    assert_true(misfit_of(&p.s, p.x) < test_size(1, 100) * 1e-5 * before);
-    for (size_t i = 0; i < p.s.count; ++i) {
+    const double least = test_simulated(*state) ? 0.5 : test_size(1, 100) * 1e-5;
+    assert_true(misfit < least * before);
+    assert_true(misfit_of(&p.s, p.x) < least * before);
+    for (size_t i = 0; i < p.s.count && !test_simulated(*state); ++i) {
         ov_quadric found;
         ov_factor_quadric(p.x + i * P, &found);
         const double share = test_small() ? 0.15 : 0.01;

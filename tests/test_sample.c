@@ -169,11 +169,14 @@ static void small_molecule(void **state) {
                              {.low = 0.5, .high = 2.5},
                              {.low = -0.5, .high = 1.5}};
     size_t count[4];
-    for (size_t n = 0; n < 4; ++n) {
+    for (size_t n = 0; n < 4; n = test_next(*state, n, 3)) {
         j.band = bands[n];
         count[n] = expect_samples(*state, &j);
     }
-    assert_true(count[1] < count[0] && count[0] > count[3]);
+    assert_true(count[0] > count[3]);
+    if (test_simulated(*state))
+        return;
+    assert_true(count[1] < count[0]);
     j.decay = 0.9;
     j.spacing = 1.3;
     j.padding = 0.0;
@@ -183,7 +186,7 @@ static void small_molecule(void **state) {
 /* With c = 1 the band reaches down to 0, and every exterior point belongs to it. */
 static void exterior_points_are_kept(void **state) {
     const double xyzr[4] = {0.3, 0.2, -0.1, 1.5};
-    const double far = test_size(12, 9);
+    const double far = test_size(12, 7);
     const job j = {.xyzr = xyzr,
                    .atoms = 1,
                    .decay = 0.5,
@@ -322,17 +325,19 @@ static void odd_molecules(void **state) {
     const double straight[] = {0.0, 7.0, 5.0, 1.5, 2.5, 7.0, 5.0, 1.6, 6.0, 7.0, 5.0, 1.4};
     const double far[] = {1e5, -2e5, 3e4, 1.5, 1e5 + 2.0, -2e5 - 1.0, 3e4 + 1.0, 1.7};
     const job jobs[] = {
+        {bare, 1, 0.5, 0.5, 0.0, {.low = 0.0, .high = 2.0}},
+        {flat, 3, 0.5, 0.4, 0.0, {.low = 0.0, .high = 2.0}},
+        {straight, 3, 0.5, 0.1, 0.0, {.low = 0.0, .high = 2.0}},
+        {one, 1, 0.5, 50.0, 3.0, {.low = 0.0, .high = 2.0}},
         {one, 1, 0.5, 0.6, 3.0, {.low = 0.0, .high = 2.0}},
         {one, 1, 0.3, 0.6, 3.0, {.low = 0.02, .high = 2.0}},
         {bare, 3, 0.5, 0.5, 2.0, {.low = 0.0, .high = 2.0}},
-        {bare, 1, 0.5, 0.5, 0.0, {.low = 0.0, .high = 2.0}},
         {coincident, 3, 0.5, 0.6, 3.5, {.low = 0.0, .high = 2.0}},
-        {flat, 3, 0.5, 0.4, 0.0, {.low = 0.0, .high = 2.0}},
-        {straight, 3, 0.5, 0.1, 0.0, {.low = 0.0, .high = 2.0}},
         {far, 2, 0.5, 0.6, 3.0, {.low = 0.0, .high = 2.0}},
-        {one, 1, 0.5, 50.0, 3.0, {.low = 0.0, .high = 2.0}},
     };
-    for (size_t n = 0; n < sizeof jobs / sizeof jobs[0]; ++n)
+    enum { SHAPES = 4, JOBS = sizeof jobs / sizeof *jobs };
+    const size_t tried = test_simulated(*state) ? SHAPES : JOBS; /* lattices without a side */
+    for (size_t n = 0; n < tried; ++n)
         expect_samples(*state, &jobs[n]);
 }
 
@@ -391,6 +396,7 @@ static void empty_space_between_atoms(void **state) {
 /* Atoms as far apart as coordinates can be, one of them by itself: as many points about each as
  * about one that is alone. */
 static void atoms_at_the_ends_of_space(void **state) {
+    test_skip_simulated(*state); /* the host places the pieces */
     const double xyzr[] = {-1e6, 1e6, -1e6, 1.7, 1e6, -1e6, 1e6, 1.7, 1e6, -1e6, 1e6 - 1.4, 1.7};
     const ov_band shell = {.low = 0.02, .high = 2.0};
     const job one = {xyzr, 1, 0.5, 0.7, 3.0, {.low = 0.02, .high = 2.0}},
@@ -406,6 +412,7 @@ static void atoms_at_the_ends_of_space(void **state) {
 
 /* Sampling can be stopped between pieces, and leaves nothing behind. */
 static void sampling_can_be_stopped(void **state) {
+    test_skip_simulated(*state); /* the host asks */
     const double xyzr[] = {0.0, 0.0, 0.0, 1.7, 0.0, 0.0, 140.0, 1.7};
     uint64_t asked = 0;
     const ov_sampling sampling = {.go_on = stop_at_third, .user = &asked};

@@ -539,7 +539,7 @@ static void a_stop_stops_all_and_they_resume(void **state) {
     expect_all(OVOID_ERROR_CANCELLED, "rank 1: ");
     assert_non_null(all_ranks[0].model);
     expect_same_models(all_ranks[0].model, all_ranks[1].model);
-    assert_true(length_of(path) > 1000);
+    assert_true(length_of(path) > 600); /* one part at least: the head alone has 304 */
     dismiss_ranks();
     options.parts.resume = 1;
     gather_ranks(3, molecule, &options);

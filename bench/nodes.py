@@ -21,10 +21,10 @@ from pathlib import Path
 import common
 
 FITS = {
-    "AChE": ["--part-atoms", "600", "--ratio", "0.066"],
-    "1aon": ["--part-atoms", "4096", "--ratio", "0.066"],
+    "AChE": ["--part-atoms", "600", "--ratio", "0.066", "--effort", "0"],
+    "1aon": ["--part-atoms", "4096", "--ratio", "0.066", "--effort", "0"],
 }
-TRIALS = {"FAS2": ["--part-atoms", "64", "--ratio", "0.066"]}  # to try this program
+TRIALS = {"FAS2": ["--part-atoms", "64", "--ratio", "0.066", "--effort", "0"]}  # to try this program
 # What shares the work: ranks, devices of each, jobs on each device.
 CREWS = [(1, 1, 1), (1, 1, 2), (1, 2, 1), (2, 1, 1), (4, 1, 1)]
 

@@ -3,7 +3,7 @@
 
 What a fit in parts would take on several equal devices, from what each of its tasks took on one: the report of
 
-    ovoid fit MOLECULE --ratio 0.066 --no-measure --profile --report REPORT
+    ovoid fit MOLECULE --ratio 0.066 --effort 0 --no-measure --profile --report REPORT
 
 says of each task what it took and which others it waited for. This plays the ranks' scheduler
 (host/fit/parts/sharing.c) with these seconds: a stage begins when the one before is done, tasks that wait for none go

@@ -94,7 +94,8 @@ static ovoid_status measure_sheet(ov_surveyor *s, ov_sheet *from, ov_sheet *to) 
             from->distance[v] = INFINITY;
         return OVOID_OK;
     }
-    s->meter.enough = isinf(s->options->least) ? 0.0 : ENOUGH * s->options->least;
+    const bool exact = s->options->exact || isinf(s->options->least);
+    s->meter.enough = exact ? 0.0 : ENOUGH * s->options->least;
     const ovoid_status status = ov_vertex_distances_begin(s->context, &s->meter, &to->facets,
                                                           &from->facets, from->distance);
     if (status != OVOID_OK) {

@@ -95,6 +95,7 @@ void ov_survey_cell_destroy(ov_survey_cell *cell);
 typedef struct ov_survey_options {
     double isovalue, spacing; /* of both meshes, angstrom */
     double least;             /* angstrom: what is as far as this is a spot; INFINITY: nothing is */
+    bool exact;               /* else distances far below `least` may be told as more */
     ovoid_vertex_rule vertices; /* linear: areas and volumes of flat triangles */
     bool flat;                  /* so, too: they only tell outer surfaces from cavities */
     double halo;     /* angstrom: so far about the cell the terms make the surfaces what they are,

@@ -61,9 +61,15 @@ cleanup:
     return status;
 }
 
+/* What is mended is to be as near as the rest, which the tolerance tells. */
+static bool mends(const ov_adaptive *f) {
+    return f->around.spot_count > 0;
+}
+
 static bool is_worth_it(const ov_adaptive *f, const ov_trial *t) {
-    const double enough = ov_tuned.sharpen_enough / sqrt(2.0 * f->options->decay);
-    return t->judgement.valid && t->judgement.deviation > enough;
+    const double enough = mends(f) ? f->options->adaptive.tolerance
+                                   : ov_tuned.sharpen_enough / sqrt(2.0 * f->options->decay);
+    return t->judgement.valid && t->judgement.deviation >= enough;
 }
 
 /* One try, in t: brings what is furthest off, walls of cavities too where `whole`, to a share of
@@ -108,8 +114,9 @@ ovoid_status ov_adaptive_sharpen(ov_adaptive *f, ov_trial *best) {
     ov_trial t = {0};
     OV_TRY(ov_trial_create(f, &t));
     OV_TRY(judge(f, best));
-    OV_TRY(sharpen(f, true, &t, best));
-    if (best->judgement.hausdorff > best->judgement.deviation)
+    if (!mends(f))
+        OV_TRY(sharpen(f, true, &t, best));
+    if (mends(f) || best->judgement.hausdorff > best->judgement.deviation)
         OV_TRY(sharpen(f, false, &t, best));
 cleanup:
     ov_trial_destroy(&t);

@@ -92,7 +92,8 @@ ovoid_status ov_part_survey(ovoid_context *context, const ov_parts *parts, size_
     ov_survey_options wanted = {.isovalue = options->isovalue,
                                 .spacing = options->adaptive.mesh_spacing,
                                 .flat = true,
-                                .least = parts->least};
+                                .least = parts->least,
+                                .exact = parts->ellipsoids};
     ov_scene scene = {0};
     ov_quadric *original = NULL;
     OV_TRY(ov_scene_of_cell(context, parts, p, &scene));

@@ -133,19 +133,15 @@ static void add_results(const ov_parts *parts, ovoid_fit_result *result) {
     result->reached = result->verdict == OVOID_VERDICT_REACHED;
 }
 
-/* What is off by that much where parts meet is mended: the tolerance or, of so many ellipsoids, the
- * mean of what the parts themselves were brought to. */
+/* What is off by that much where parts meet is mended: the tolerance or, of so many ellipsoids,
+ * more than any part was brought to. */
 static double least_of(const ov_parts *parts) {
-    double sum = 0.0;
-    size_t count = 0;
+    double most = -INFINITY;
     if (!parts->ellipsoids)
         return parts->options->adaptive.tolerance;
     for (size_t p = 0; p < parts->partition.count; ++p)
-        if (parts->fit[p].result.distance >= 0.0) { /* it was measured */
-            sum += parts->fit[p].result.distance;
-            ++count;
-        }
-    return count > 0 ? sum / (double)count : INFINITY;
+        most = fmax(most, parts->fit[p].result.distance); /* NAN where it was not measured */
+    return most >= 0.0 ? most : INFINITY;
 }
 
 static bool is_mended(const ov_parts *parts) {

@@ -192,7 +192,7 @@ static ovoid_status fit_patch(ovoid_context *context, const patches *all, patch 
                               const ov_chosen *chosen, const ov_found *start, size_t done) {
     ovoid_status status = OVOID_OK;
     const ov_parts *const parts = all->parts;
-    const ovoid_fit_options options = ov_part_options(parts, one->ellipsoids);
+    ovoid_fit_options options = ov_part_options(parts, one->ellipsoids);
     ov_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     ov_scene scene = {0};
     ov_rigid *images = NULL;
@@ -208,6 +208,7 @@ static ovoid_status fit_patch(ovoid_context *context, const patches *all, patch 
     around.total = all->cut.count;
     around.spots = one->spot;
     around.spot_count = one->spots;
+    options.adaptive.tolerance = parts->least;
     OV_TRY(list_images(context, parts, &box, &around, &images));
     OV_TRY(ov_adaptive_create(context, scene.xyzr, one->atoms, &around, false, &adaptive));
     OV_TRY(ov_adaptive_reach(adaptive, &options, start, ov_seconds(), &one->fit.found,
@@ -402,7 +403,7 @@ static ovoid_status tell_touched(ovoid_context *context, const patches *all, ov_
     return OVOID_OK;
 }
 
-ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t jobs,
+ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, double reach,
                              const ov_spot *spots, size_t count, ov_box **touched,
                              size_t *touched_count, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
@@ -411,7 +412,7 @@ ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t job
                    .cut = {.near = 2.0 * parts->partition.near,
                            .image = parts->partition.image,
                            .images = parts->partition.images},
-                   .reach = ov_tuned.patch_reach * length};
+                   .reach = reach * length};
     OV_TRY(make_patches(context, spots, count, &all));
     for (uint32_t colour = 0; colour < all.cut.colours; ++colour) {
         const ov_shared_work work = {.kind = OVOID_TASK_MEND,
@@ -420,7 +421,7 @@ ovoid_status ov_patches_mend(ovoid_context *context, ov_parts *parts, size_t job
                                      .unpack = unpack};
         for (size_t p = 0; p < all.cut.count; ++p)
             all.todo[p] = all.cut.part[p].colour == colour;
-        OV_TRY(ov_ranks_work(context, parts->ranks, &all.cut, jobs, &work));
+        OV_TRY(ov_ranks_work(context, parts->ranks, &all.cut, parts->jobs, &work));
         OV_TRY(replace(context, &all));
         count_work(&all, result);
     }

@@ -16,10 +16,6 @@ typedef struct job {
     ov_survey_cell *cell,
         *fresh; /* of each part: what its last survey says, until it is committed */
     ov_survey_total *total;
-    ov_spot *spot; /* what is mended in a round */
-    size_t spots;
-    ov_spot *tried; /* in all of them */
-    size_t tries, tries_room;
 } job;
 
 static ovoid_status survey_task(ovoid_context *context, size_t part, size_t done, void *user) {
@@ -122,46 +118,15 @@ static bool is_better(const job *j, const mended *before) {
            (now->spots == before->spots && now->deviation < before->deviation);
 }
 
-/* What a survey says of a place that has stayed as it was differs by less, angstrom. */
-#define SAME 1e-3
-
-static bool was_tried(const job *j, const ov_spot *spot) {
-    for (size_t n = 0; n < j->tries; ++n)
-        if (fabs(j->tried[n].distance - spot->distance) < SAME &&
-            ov_spots_near(&j->tried[n], 1, spot->at, SAME))
-            return true;
-    return false;
-}
-
-/* Chooses the spots to be mended. So many ellipsoids cannot become more where they did not help:
- * what has stayed as it was is left alone. */
-static ovoid_status choose_spots(ovoid_context *context, job *j) {
-    ovoid_status status = OVOID_OK;
-    const ov_survey_total *const total = j->total;
-    const size_t before = j->tries;
-    free(j->spot);
-    j->spots = 0;
-    j->spot = ov_alloc(context, total->spots, sizeof *j->spot, "spots");
-    if (!j->spot)
-        return OVOID_ERROR_MEMORY;
-    for (size_t n = 0; n < total->spots; ++n)
-        if (!j->parts->ellipsoids || !was_tried(j, &total->spot[n]))
-            j->spot[j->spots++] = total->spot[n];
-    OV_TRY(
-        ov_grow(context, &j->tried, &j->tries_room, before + j->spots, sizeof *j->tried, "spots"));
-    for (size_t n = 0; n < j->spots; ++n)
-        j->tried[j->tries++] = j->spot[n];
-cleanup:
-    return status;
-}
-
-/* Fits patches about what is off, and surveys what that touched. */
-static ovoid_status mend(ovoid_context *context, job *j, ovoid_fit_result *result) {
+/* Fits patches about what is off, and surveys what that touched. Where so many ellipsoids did not
+ * help, others may have one to spare: patches become larger from round to round. */
+static ovoid_status mend(ovoid_context *context, job *j, uint32_t round, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     ov_box *touched = NULL;
     size_t count = 0;
-    OV_TRY(ov_patches_mend(context, j->parts, j->parts->jobs, j->spot, j->spots, &touched, &count,
-                           result));
+    const double wider = j->parts->ellipsoids ? pow(ov_tuned.patch_wider, round) : 1.0;
+    OV_TRY(ov_patches_mend(context, j->parts, wider * ov_tuned.patch_reach, j->total->spot,
+                           j->total->spots, &touched, &count, result));
     choose_touched(j, touched, count);
     OV_TRY(survey(context, j));
 cleanup:
@@ -174,30 +139,39 @@ static void choose_all(job *j) {
         j->todo[p] = true;
 }
 
+/* Takes back what was kept, to be surveyed unless all that matters of that is known. */
+static ovoid_status go_back(ovoid_context *context, job *j, mended *kept, bool surveyed) {
+    ov_found_destroy(&j->parts->model);
+    j->parts->model = kept->model;
+    kept->model = (ov_found){0};
+    choose_all(j);
+    return surveyed ? survey(context, j) : OVOID_OK;
+}
+
 /* A part is held to the surface among what lies about it. Cavities of the model that open through a
  * neck in another part are seen by a look at all of them, and are mended then; so are seams where
  * images of one part meet. The best that any round ended with is what comes out. */
 static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *result) {
     ovoid_status status = OVOID_OK;
     mended best = {0};
+    const bool by_number = j->parts->ellipsoids;
+    const uint32_t rounds = by_number ? ov_tuned.patch_rounds : ov_tuned.part_mends;
     uint32_t n = 0;
     choose_all(j);
     OV_TRY(survey(context, j));
-    for (; n < ov_tuned.part_mends; ++n) {
-        if (n > 0 && !is_better(j, &best))
-            break;
-        OV_TRY(choose_spots(context, j));
-        if (j->spots == 0)
-            break;
+    for (; n < rounds && j->total->spots > 0; ++n) {
+        if (n > 0 && !is_better(j, &best)) {
+            if (!by_number)
+                break;
+            OV_TRY(go_back(context, j, &best, true));
+        }
         OV_TRY(keep(context, j, &best));
-        OV_TRY(mend(context, j, result));
+        OV_TRY(mend(context, j, n, result));
     }
     if (n > 0 && !is_better(j, &best)) {
-        ov_found_destroy(&j->parts->model);
-        j->parts->model = best.model;
-        best.model = (ov_found){0};
-        choose_all(j);
-        OV_TRY(survey(context, j));
+        const double deviation = best.deviation;
+        OV_TRY(go_back(context, j, &best, !by_number));
+        j->total->deviation = deviation;
     }
 cleanup:
     ov_found_destroy(&best.model);
@@ -211,8 +185,6 @@ static void destroy(job *j) {
         if (j->fresh)
             ov_survey_cell_destroy(&j->fresh[p]);
     }
-    free(j->spot);
-    free(j->tried);
     free(j->cell);
     free(j->fresh);
     free(j->todo);

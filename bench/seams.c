@@ -2,11 +2,11 @@
  * How good a fit is where its parts meet: seams MOLECULE
  *
  * Fits the molecule as a whole and cut into 4 and 16 parts, to the default tolerance and by ratio
- * (0.066, with effort 0 and 1), and measures what lies within 5 angstrom of the seams between 4, or 16, parts beside
- * what lies elsewhere; of the whole, too, in the same places. Prints CSV: of both surfaces, meshed
- * 0.5 angstrom apart, area and its error, volume (by points 0.5 angstrom apart) and its error, the
- * mean distance of vertices from the other surface weighted with their areas, and the deviation,
- * the largest one of a vertex of an exposed piece.
+ * (0.066, with effort 0 and 1), and measures what lies within 5 angstrom of the seams between 4, or
+ * 16, parts beside what lies elsewhere; of the whole, too, in the same places. Prints CSV: of both
+ * surfaces, meshed 0.5 angstrom apart, area and its error, volume (by points 0.5 angstrom apart)
+ * and its error, the mean distance of vertices from the other surface weighted with their areas,
+ * and the deviation, the largest one of a vertex of an exposed piece.
  */
 #include "measure/compare.h"
 #include "measure/partition.h"

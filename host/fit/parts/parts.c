@@ -145,8 +145,9 @@ static double least_of(const ov_parts *parts) {
 }
 
 static bool is_mended(const ov_parts *parts) {
+    const ovoid_adaptive_options *const wanted = &parts->options->adaptive;
     return !parts->ellipsoids ||
-           (meet(parts) && parts->options->adaptive.effort > 0 && parts->least < INFINITY);
+           (meet(parts) && wanted->effort > 0 && wanted->steps > 0 && parts->least < INFINITY);
 }
 
 /* What the last survey of all says takes the place of what each part said. */

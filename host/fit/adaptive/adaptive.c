@@ -123,7 +123,7 @@ cleanup:
 /* The model at hand that others can be held against: the start or the part's own atoms. Returns how
  * many ellipsoids. */
 static size_t take_standard(ov_adaptive *f) {
-    if (f->around.spot_count > 0) {
+    if (ov_adaptive_is_patch(f)) {
         memcpy(f->quadrics, f->start->quadrics, f->start->count * sizeof *f->quadrics);
         return f->start->count;
     }
@@ -136,7 +136,7 @@ static size_t take_standard(ov_adaptive *f) {
  * too, counts where it is far more so, and one of its ellipsoids that has strayed counts anywhere.
  * Of a start that is mended nothing else is to become worse. */
 static ovoid_status excuse_by_number(ov_adaptive *f, ov_judge *judge) {
-    const bool mends = f->around.spot_count > 0;
+    const bool mends = ov_adaptive_is_patch(f);
     judge->excused_times = mends ? ov_tuned.patch_excused_times : ov_tuned.part_excused_times;
     judge->stray = mends ? INFINITY : ov_tuned.part_stray / judge->root_2d;
     judge->whole = true;
@@ -210,8 +210,8 @@ static ovoid_status reach_goal(ov_adaptive *f, ov_trial *best) {
     case OVOID_GOAL_TOLERANCE:
         break;
     }
-    return f->around.spot_count > 0 ? ov_adaptive_mend(f, wanted->tolerance, best)
-                                    : ov_adaptive_tolerance(f, wanted->tolerance, best);
+    return ov_adaptive_is_patch(f) ? ov_adaptive_mend(f, wanted->tolerance, best)
+                                   : ov_adaptive_tolerance(f, wanted->tolerance, best);
 }
 
 static void multiply_amplitudes(ov_adaptive *f, size_t count, double factor) {

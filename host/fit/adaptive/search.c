@@ -104,7 +104,7 @@ size_t ov_adaptive_surround(ov_adaptive *f, size_t count) {
 ovoid_status ov_adaptive_volume(ov_adaptive *f, size_t count, double *ratio) {
     const double *const others = f->xyzr + 4 * f->atoms;
     *ratio = 1.0;
-    if (f->around.spot_count > 0 && f->options->adaptive.goal != OVOID_GOAL_TOLERANCE)
+    if (ov_adaptive_is_patch(f) && f->options->adaptive.goal != OVOID_GOAL_TOLERANCE)
         return OVOID_OK; /* few ellipsoids, which would have to make up for all about them */
     for (size_t i = 0; i < f->around.atoms; ++i)
         ov_quadric_of_atom(others + 4 * i, f->options->decay, &f->quadrics[count + i]);

@@ -59,6 +59,11 @@ static inline bool ov_adaptive_is_part(const ov_adaptive *f) {
     return f->around.atoms > 0 || f->around.images > 0 || f->around.fixed_count > 0;
 }
 
+/* Whether it is of the places of a start that are to be mended. */
+static inline bool ov_adaptive_is_patch(const ov_adaptive *f) {
+    return f->around.spot_count > 0;
+}
+
 /* What is tried where effort 0, which leaves out what only makes a model sharper, tries as much as
  * 1. */
 static inline uint32_t ov_adaptive_effort(const ov_adaptive *f) {

@@ -61,14 +61,11 @@ cleanup:
     return status;
 }
 
-/* What is mended is to be as near as the rest, which the tolerance tells. */
-static bool mends(const ov_adaptive *f) {
-    return f->around.spot_count > 0;
-}
-
+/* A patch is to be as near as the rest, which the tolerance tells. */
 static bool is_worth_it(const ov_adaptive *f, const ov_trial *t) {
-    const double enough = mends(f) ? f->options->adaptive.tolerance
-                                   : ov_tuned.sharpen_enough / sqrt(2.0 * f->options->decay);
+    const double enough = ov_adaptive_is_patch(f)
+                              ? f->options->adaptive.tolerance
+                              : ov_tuned.sharpen_enough / sqrt(2.0 * f->options->decay);
     return t->judgement.valid && t->judgement.deviation >= enough;
 }
 
@@ -114,9 +111,9 @@ ovoid_status ov_adaptive_sharpen(ov_adaptive *f, ov_trial *best) {
     ov_trial t = {0};
     OV_TRY(ov_trial_create(f, &t));
     OV_TRY(judge(f, best));
-    if (!mends(f))
+    if (!ov_adaptive_is_patch(f))
         OV_TRY(sharpen(f, true, &t, best));
-    if (mends(f) || best->judgement.hausdorff > best->judgement.deviation)
+    if (ov_adaptive_is_patch(f) || best->judgement.hausdorff > best->judgement.deviation)
         OV_TRY(sharpen(f, false, &t, best));
 cleanup:
     ov_trial_destroy(&t);

@@ -13,8 +13,8 @@
 typedef struct job {
     ov_parts *parts;
     bool *todo;
-    ov_survey_cell *cell,
-        *fresh; /* of each part: what its last survey says, until it is committed */
+    ov_survey_cell *cell;  /* of each part: what its last survey says, */
+    ov_survey_cell *fresh; /* and the one at hand, until it is committed */
     ov_survey_total *total;
 } job;
 

@@ -4,11 +4,12 @@
     bench/tolerance.py fits --ovoid build/release/ovoid --molecules DIR [--csv FILE]
     bench/tolerance.py direct --ovoid build/release/ovoid --molecules DIR [--csv FILE]
     bench/tolerance.py settings --ovoid build/release/ovoid --molecules DIR [--csv FILE]
+    bench/tolerance.py efforts --ovoid build/release/ovoid --molecules DIR [--csv FILE]
 
 fits: default fits of molecules of all sizes, protonated or not, and what they deviate by when both
 surfaces are meshed at 0.2 Å. direct: the fewest ellipsoids with
 which --ellipsoids, a search by count, with effort 0, stays within 0.5 Å too; fewer than a fit found mean that it
-should have found them. settings: other tolerances, decay rates and isovalues.
+should have found them. settings: other tolerances, decay rates and isovalues. efforts: 0, 1 and 2.
 
 DIR has the molecules of the paper and some more; others come from Debian's apbs-data, pymol-data.
 Molecules that are not there are left out, and named. Seconds are of whole processes.
@@ -78,6 +79,8 @@ SETTINGS = [["--tolerance", "0.2"], ["--tolerance", "0.3"], ["--tolerance", "1"]
             ["--tolerance", "2"], ["--decay", "0.3"], ["--decay", "0.7"], ["--decay", "1"],
             ["--isovalue", "0.5"], ["--isovalue", "2"]]
 SETTINGS_OF = ["1MAG", "FAS2", "1aki", "lys1", "1UBQ"]
+EFFORTS = [["--effort", "0"], [], ["--effort", "2"]]
+EFFORTS_OF = ["1MAG", "1crn", "FAS2", "1aki", "lys1", "actin", "AChE"]
 COLUMNS = ["molecule", "options", "atoms", "ellipsoids", "ratio", "reached", "deviation",
            "deviation_bound", "area_error", "volume_error", "area_error_outer", "hausdorff_outer",
            "mean_distance_outer", "seconds", "deviation_finer", "direct", "direct_deviation"]
@@ -120,8 +123,9 @@ def by_count(ovoid, source, found, tolerance):
 
 def rows_of(kind, ovoid, name, source):
     """The rows of one molecule."""
-    if kind == "settings":
-        return [dict(fit(ovoid, source, options), molecule=name) for options in SETTINGS]
+    if kind in ("settings", "efforts"):
+        return [dict(fit(ovoid, source, options), molecule=name)
+                for options in (SETTINGS if kind == "settings" else EFFORTS)]
     row = dict(fit(ovoid, source, [], kind == "fits"), molecule=name)
     if kind == "direct":
         row["direct"], row["direct_deviation"] = by_count(ovoid, source, row["ellipsoids"], 0.5)
@@ -131,13 +135,14 @@ def rows_of(kind, ovoid, name, source):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kind", choices=["fits", "direct", "settings"])
+    parser.add_argument("kind", choices=["fits", "direct", "settings", "efforts"])
     parser.add_argument("--ovoid", required=True)
     parser.add_argument("--molecules", required=True, metavar="DIR")
     parser.add_argument("--only", help="these alone, with commas between")
     parser.add_argument("--csv", metavar="FILE")
     wanted = parser.parse_args()
-    names = {"fits": MOLECULES, "direct": DIRECT, "settings": SETTINGS_OF}[wanted.kind]
+    names = {"fits": MOLECULES, "direct": DIRECT, "settings": SETTINGS_OF,
+             "efforts": EFFORTS_OF}[wanted.kind]
     if wanted.only:
         names = wanted.only.split(",")
     rows = []

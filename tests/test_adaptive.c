@@ -574,6 +574,29 @@ static void effort_helps(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* With effort 0 a search to a tolerance is soon content, and holds it as well. */
+static void without_effort_it_ends_sooner(void **state) {
+    test_skip_simulated(*state);
+    if (strstr(ovoid_context_device(*state)->platform, "rusticl"))
+        skip(); /* as above */
+    ovoid_molecule *molecule = random_chain(*state, test_size(250, 40), 31);
+    outcome o[2];
+    for (uint32_t effort = 0; effort < 2; ++effort) {
+        ovoid_fit_options options = options_of(OVOID_GOAL_TOLERANCE, 0.5);
+        options.adaptive.effort = effort;
+        o[effort] = fit(*state, molecule, &options);
+        assert_true(o[effort].result.reached);
+        print_message("effort %u: %llu ellipsoids, %llu steps\n", effort,
+                      (unsigned long long)o[effort].result.ellipsoids,
+                      (unsigned long long)o[effort].result.iterations);
+        ovoid_model_destroy(&o[effort].model);
+    }
+    assert_true(4 * o[0].result.iterations < 3 * o[1].result.iterations);
+    assert_true(o[0].result.ellipsoids >= o[1].result.ellipsoids);
+    assert_true(10 * o[0].result.ellipsoids <= 12 * o[1].result.ellipsoids);
+    ovoid_molecule_destroy(&molecule);
+}
+
 /* With effort 0 nothing is done about what is furthest off. */
 static void the_furthest_comes_nearer(void **state) {
     test_skip_simulated(*state);
@@ -788,6 +811,7 @@ int main(void) {
         cmocka_unit_test(a_rod_equals_its_integral),
         cmocka_unit_test(merges_get_their_chances),
         cmocka_unit_test(effort_helps),
+        cmocka_unit_test(without_effort_it_ends_sooner),
         cmocka_unit_test(the_furthest_comes_nearer),
         cmocka_unit_test(two_fits_give_the_same_bits),
         cmocka_unit_test(a_stopped_fit_hands_over_what_held),

@@ -78,7 +78,8 @@ typedef struct ovoid_adaptive_options { /* 48 bytes */
     uint32_t ellipsoids;                /* for OVOID_GOAL_ELLIPSOIDS; more than atoms is an error */
     double ratio;                       /* for OVOID_GOAL_RATIO, at most 1 */
     uint32_t effort;     /* 1 (the default) to 10: how many starts and repairs are tried; 0: of so
-                            many ellipsoids the largest distances are not brought down as well */
+                            many ellipsoids the largest distances are not brought down as well, and
+                            a search to a tolerance ends as soon as it gains little */
     uint32_t steps;      /* Levenberg-Marquardt steps of one refinement at most: 60; 0 leaves the
                             merged Gaussians as they are */
     double mesh_spacing; /* of the meshes that surfaces are judged on, angstrom: 0.5. What is

@@ -64,8 +64,8 @@ static inline bool ov_adaptive_is_patch(const ov_adaptive *f) {
     return f->around.spot_count > 0;
 }
 
-/* What is tried where effort 0, which leaves out what only makes a model sharper, tries as much as
- * 1. */
+/* What is tried where effort 0, which only leaves out sharpening and ends shrinking soon, tries as
+ * much as 1. */
 static inline uint32_t ov_adaptive_effort(const ov_adaptive *f) {
     return f->options->adaptive.effort > 1 ? f->options->adaptive.effort : 1;
 }

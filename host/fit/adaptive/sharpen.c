@@ -50,6 +50,7 @@ static ovoid_status exchange(ov_adaptive *f, double tolerance, ov_trial *t) {
                                  frame ? ov_tuned.sharpen_rounds : ov_tuned.sharpen_patience};
     const ov_shrinking shrink = {.stage = "sharpen",
                                  .least = count,
+                                 .gain = ov_tuned.shrink_gain,
                                  .idle_rounds = ov_tuned.sharpen_idle_rounds,
                                  .idle_tries = ov_tuned.sharpen_idle_tries};
     OV_TRY(ov_adaptive_spots(f, t, tolerance, f->capacity, &spots));

@@ -302,7 +302,7 @@ static bool is_idle(shrinking *s, const ov_shrinking *how, size_t tries, size_t 
         ++s->idle_rounds;
         s->idle_tries += tries;
     }
-    if ((double)count <= (1.0 - ov_tuned.shrink_gain) * (double)s->milestone) {
+    if ((double)count <= (1.0 - how->gain) * (double)s->milestone) {
         s->milestone = count;
         s->idle_rounds = 0;
         s->idle_tries = 0;

@@ -96,21 +96,33 @@ static ovoid_status take_atoms(ov_adaptive *f, ov_trial *t) {
     return status != OVOID_OK ? status : ov_adaptive_judge(f, t);
 }
 
+/* When shrinking ends, by what is fitted. */
+static void choose_patience(const ov_adaptive *f, ov_shrinking *how) {
+    const uint32_t effort = f->options->adaptive.effort;
+    const bool frame = is_frame(f), part = ov_adaptive_is_part(f);
+    if (effort == 0) {
+        how->gain = ov_tuned.shrink_soon_gain;
+        how->idle_rounds = ov_tuned.shrink_soon_rounds;
+        return;
+    }
+    how->gain = ov_tuned.shrink_gain;
+    how->thorough = !frame && !part;
+    how->idle_rounds = effort * (frame  ? ov_tuned.motion_idle_rounds
+                                 : part ? ov_tuned.shrink_part_idle_rounds
+                                        : ov_tuned.shrink_idle_rounds);
+    how->idle_tries = effort * (frame  ? ov_tuned.motion_idle_tries
+                                : part ? ov_tuned.shrink_part_idle_tries
+                                       : ov_tuned.shrink_idle_tries);
+}
+
 /* The model of the last frame was shrunk as far as it goes: only where growing ended with more
  * ellipsoids than frames can do with, and some, they are made fewer. */
 static ovoid_status shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
-    const uint32_t effort = ov_adaptive_effort(f);
-    const bool frame = is_frame(f), part = ov_adaptive_is_part(f);
+    const bool frame = is_frame(f);
     const double slack = 1.0 + ov_tuned.motion_slack;
-    const ov_shrinking how = {.stage = "shrink",
-                              .least = frame ? (size_t)(slack * (double)f->start->fewest) : 1,
-                              .thorough = !frame && !part,
-                              .idle_rounds = effort * (frame  ? ov_tuned.motion_idle_rounds
-                                                       : part ? ov_tuned.shrink_part_idle_rounds
-                                                              : ov_tuned.shrink_idle_rounds),
-                              .idle_tries = effort * (frame  ? ov_tuned.motion_idle_tries
-                                                      : part ? ov_tuned.shrink_part_idle_tries
-                                                             : ov_tuned.shrink_idle_tries)};
+    ov_shrinking how = {.stage = "shrink",
+                        .least = frame ? (size_t)(slack * (double)f->start->fewest) : 1};
+    choose_patience(f, &how);
     const ovoid_status status = ov_adaptive_shrink(f, tolerance, &how, best);
     f->fewest = best->count;
     if (frame) { /* if that many are there still, it takes so many */

@@ -43,11 +43,12 @@ ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots, double
 ovoid_status ov_adaptive_grow(ov_adaptive *f, double tolerance, const ov_growing *how, ov_trial *t,
                               ov_spots *spots);
 
-/* When shrinking ends: at so many ellipsoids, or when so many rounds and tries in a row gained next
- * to nothing together; thorough: of rounds that merged few at once. */
+/* When shrinking ends: at so many ellipsoids, or when so many rounds and tries in a row gained less
+ * than a share of them together; thorough: of rounds that merged few at once. */
 typedef struct ov_shrinking {
     const char *stage;
     size_t least;
+    double gain;
     uint32_t idle_rounds, idle_tries;
     bool thorough;
 } ov_shrinking;

@@ -240,7 +240,8 @@ class Molecule(Pictured):
             Of the meshes on which surfaces are compared (Å, default 0.5).
         effort : int, optional
             1 (default) to 10: more starts and repairs, more time. 0, of so many ellipsoids:
-            the largest distances are not brought down, in a fraction of the time.
+            the largest distances are not brought down, in a fraction of the time; to a
+            tolerance: soon content, with a few percent more ellipsoids.
         steps : int, optional
             Of each refinement at most (default 60).
         part_atoms : int, optional

@@ -100,6 +100,23 @@ ovoid_status __wrap_ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, 
                                  spot_count);
 }
 
+ovoid_status __real_ov_judge_spots_near(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                        double least, double apart, size_t most,
+                                        ov_judgement *judgement, ov_spot **spots,
+                                        size_t *spot_count, bool *whole);
+ovoid_status __wrap_ov_judge_spots_near(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                        double least, double apart, size_t most,
+                                        ov_judgement *judgement, ov_spot **spots,
+                                        size_t *spot_count, bool *whole);
+ovoid_status __wrap_ov_judge_spots_near(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                        double least, double apart, size_t most,
+                                        ov_judgement *judgement, ov_spot **spots,
+                                        size_t *spot_count, bool *whole) {
+    ++judgements;
+    return __real_ov_judge_spots_near(judge, quadrics, count, least, apart, most, judgement, spots,
+                                      spot_count, whole);
+}
+
 /* ---- fits ------------------------------------------------------------------------------------ */
 
 typedef struct subject {

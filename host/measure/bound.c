@@ -92,23 +92,51 @@ static void corners_of(const bounding *b, const ov_trail *trail, size_t k, doubl
     }
 }
 
+/* The largest coordinate of a surface, from the facets' origin. */
+static ovoid_status find_largest(ovoid_context *context, const ov_trail *trail, const bounding *b,
+                                 double *largest) {
+    ovoid_status status = OVOID_OK;
+    *largest = 0.0;
+    for (size_t k = 0; k < trail->vertices; ++k) {
+        double at[3];
+        OV_TRY(ask(context, b, k, trail->vertices));
+        ov_mesh_at(trail->mesh, ov_trail_vertex(trail, k), at);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const double size = fabs(at[axis] - b->facets->origin[axis]);
+            *largest = size > *largest ? size : *largest;
+        }
+    }
+cleanup:
+    return status;
+}
+
+/* No edge of a surface is longer, squared: on a lattice than the diagonal of a cell. */
+static ovoid_status find_longest(ovoid_context *context, const ov_trail *trail, const bounding *b,
+                                 double *longest) {
+    ovoid_status status = OVOID_OK;
+    *longest = 3.0 * trail->mesh->spacing * trail->mesh->spacing;
+    if (*longest > 0.0)
+        return OVOID_OK;
+    for (size_t k = 0; k < trail->triangles; ++k) {
+        double at[3][3];
+        OV_TRY(ask(context, b, k, trail->triangles));
+        corners_of(b, trail, k, at);
+        const double edge = longest_edge((const double(*)[3])at);
+        *longest = edge > *longest ? edge : *longest;
+    }
+cleanup:
+    return status;
+}
+
 /* Adds what rounding may do because of a surface. */
 static ovoid_status find_margin(ovoid_context *context, const ov_trail *trail, bounding *b) {
-    double largest = 0.0, longest = 0.0, at[3][3]; /* longest: squared */
-    for (size_t k = 0; k < trail->triangles; ++k) {
-        const ovoid_status asked = ask(context, b, k, trail->triangles);
-        if (asked != OVOID_OK)
-            return asked;
-        corners_of(b, trail, k, at);
-        for (size_t i = 0; i < 9; ++i) {
-            const double size = fabs(at[i / 3][i % 3]);
-            largest = size > largest ? size : largest;
-        }
-        const double edge = longest_edge((const double(*)[3])at);
-        longest = edge > longest ? edge : longest;
-    }
+    ovoid_status status = OVOID_OK;
+    double largest, longest;
+    OV_TRY(find_largest(context, trail, b, &largest));
+    OV_TRY(find_longest(context, trail, b, &longest));
     b->margin += CORNER_ROUNDING * largest + ROUNDING * sqrt(longest);
-    return OVOID_OK;
+cleanup:
+    return status;
 }
 
 /* A distance changes by no more than one moves. For weights w of the corners that make a point of

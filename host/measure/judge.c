@@ -1,8 +1,7 @@
 #include "measure/judge.h"
 
-#include "measure/bound.h"
+#include "measure/judging.h"
 #include "model/factor.h"
-#include "neighbours/neighbours.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -80,6 +79,7 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     made.meshing.spacing = spacing;
     middle_of(xyzr, atoms, made.origin);
     OV_TRY(ov_marcher_create(context, &made.marcher));
+    OV_TRY(ov_marcher_create(context, &made.near_marcher));
     OV_TRY(mesh_original(&made, xyzr, atoms, decay));
     ov_marcher_stay(made.marcher);
     *judge = made;
@@ -91,6 +91,8 @@ cleanup:
 
 void ov_judge_begin(ov_judge *judge) {
     ov_marcher_begin(judge->marcher);
+    ov_marcher_begin(judge->near_marcher);
+    judge->seen.known = false;
 }
 
 void ov_judge_destroy(ov_judge *judge) {
@@ -99,6 +101,9 @@ void ov_judge_destroy(ov_judge *judge) {
     ov_meter_destroy(&judge->back);
     ov_facets_destroy(&judge->facets);
     ov_facets_destroy(&judge->other);
+    ov_seen_destroy(&judge->seen);
+    ov_marcher_destroy(&judge->near_marcher);
+    ov_facets_destroy(&judge->near);
     ov_trail_destroy(&judge->trail);
     ovoid_mesh_destroy(&judge->mesh);
     free(judge->excused);
@@ -119,26 +124,6 @@ static ovoid_status mesh_model(ov_judge *judge, const ov_quadric *quadrics, size
     return OVOID_OK;
 }
 
-static int by_distance(const void *a, const void *b) {
-    const ov_spot *const p = a, *const q = b;
-    if (p->distance != q->distance)
-        return p->distance > q->distance ? -1 : 1;
-    for (int k = 0; k < 3; ++k)
-        if (p->at[k] != q->at[k])
-            return p->at[k] < q->at[k] ? -1 : 1;
-    return 0;
-}
-
-bool ov_spots_near(const ov_spot *spots, size_t count, const double at[3], double reach) {
-    for (size_t n = 0; n < count; ++n) {
-        const double x = at[0] - spots[n].at[0], y = at[1] - spots[n].at[1],
-                     z = at[2] - spots[n].at[2];
-        if (x * x + y * y + z * z < reach * reach)
-            return true;
-    }
-    return false;
-}
-
 /* Whether it is no wonder that a point is so far off. */
 static bool is_excused(const ov_judge *judge, const double at[3], double distance) {
     for (size_t n = 0; n < judge->excused_count; ++n)
@@ -156,11 +141,10 @@ static bool is_judged(const ov_judge *judge, const double at[3], double distance
     return !is_excused(judge, at, distance);
 }
 
-/* Whether a vertex that is so far off counts; *outer: as one of an outer surface. */
-static bool counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, double distance,
-                   bool *outer) {
+bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, const bool *exposed,
+                     size_t vertex, double distance, bool *outer) {
     double at[3];
-    *outer = judge->whole || ov_mesh_is_exposed(mesh, vertex);
+    *outer = judge->whole || (exposed ? exposed[vertex] : ov_mesh_is_exposed(mesh, vertex));
     if (!judge->in_region)
         return true;
     ov_mesh_at(mesh, vertex, at);
@@ -173,7 +157,8 @@ static void add_spots(const ov_judge *judge, const ovoid_mesh *mesh, const float
                       double least, ov_spot *spots, size_t *count) {
     bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (distance[v] >= least && counts(judge, mesh, v, distance[v], &outer) && outer) {
+        if (distance[v] >= least && ov_judge_counts(judge, mesh, NULL, v, distance[v], &outer) &&
+            outer) {
             if (spots) {
                 ov_mesh_at(mesh, v, spots[*count].at);
                 spots[*count].distance = distance[v];
@@ -182,53 +167,12 @@ static void add_spots(const ov_judge *judge, const ovoid_mesh *mesh, const float
         }
 }
 
-/* What rounding may add to a distance in a grid, as a share. */
-#define ROUNDING 1e-4
-
-/* Whether one of the spots in the grid is nearer than that. */
-static bool has_near(const ov_grid *grid, const ov_spot *spots, const double at[3], double apart) {
-    uint32_t near[2 * OV_NEAR_MAX];
-    const size_t count = ov_grid_near(grid, at, UINT32_MAX, near);
-    for (size_t n = 0; n < count; ++n) {
-        double square = 0.0;
-        for (size_t k = 0; k < 3; ++k)
-            square += (at[k] - spots[near[n]].at[k]) * (at[k] - spots[near[n]].at[k]);
-        if (square < apart * apart)
-            return true;
-    }
-    return false;
-}
-
-ovoid_status ov_spots_thin(ovoid_context *context, ov_spot *spots, size_t *count, double apart,
-                           size_t most) {
-    ovoid_status status = OVOID_OK;
-    ov_grid grid = {0};
-    size_t kept = 0;
-    if (*count == 0)
-        return OVOID_OK;
-    qsort(spots, *count, sizeof *spots, by_distance);
-    if (apart > 0.0)
-        OV_TRY(ov_grid_about(context, spots->at, sizeof *spots, *count, (1.0 + ROUNDING) * apart,
-                             &grid));
-    for (size_t n = 0; n < *count && kept < most; ++n) {
-        if (apart > 0.0 && has_near(&grid, spots, spots[n].at, apart))
-            continue;
-        spots[kept] = spots[n];
-        if (apart > 0.0)
-            OV_TRY(ov_grid_add(context, &grid, spots[kept].at, (uint32_t)kept));
-        ++kept;
-    }
-    *count = kept;
-cleanup:
-    ov_grid_destroy(&grid);
-    return status;
-}
-
 static void judge_distances(const ov_judge *judge, const ovoid_mesh *mesh, const float *distance,
                             ov_judgement *judgement) {
     bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v) {
-        if (distance[v] <= judgement->deviation || !counts(judge, mesh, v, distance[v], &outer))
+        if (distance[v] <= judgement->deviation ||
+            !ov_judge_counts(judge, mesh, NULL, v, distance[v], &outer))
             continue; /* the deviation is never above the other */
         judgement->hausdorff = fmax(judgement->hausdorff, distance[v]);
         if (outer)
@@ -241,14 +185,13 @@ typedef struct trial {
     ovoid_mesh *mesh;
     ov_trail trail;                    /* of the mesh */
     float *from_original, *from_model; /* NULL where there are no two outer surfaces */
-    ov_spot *inside;                   /* spots that are no vertices */
-    size_t inside_count, inside_room;
+    ov_spot_list inside;               /* spots that are no vertices */
 } trial;
 
 static void trial_destroy(trial *t) {
     free(t->from_original);
     free(t->from_model);
-    free(t->inside);
+    free(t->inside.spot);
     ov_trail_destroy(&t->trail);
     ovoid_mesh_destroy(&t->mesh);
 }
@@ -319,37 +262,22 @@ cleanup:
 
 /* ---- spots ---------------------------------------------------------------------------------- */
 
-/* Whose spots are looked for. */
-typedef struct looking {
-    const ov_judge *judge;
-    trial *t;
-} looking;
-
-static ovoid_status add_inside(const double at[3], double distance, void *user) {
-    const looking *const l = user;
-    trial *const t = l->t;
-    const ovoid_status status = ov_grow(l->judge->context, (void *)&t->inside, &t->inside_room,
-                                        t->inside_count + 1, sizeof *t->inside, "spots");
-    if (status == OVOID_OK)
-        t->inside[t->inside_count++] = (ov_spot){.at = {at[0], at[1], at[2]}, .distance = distance};
-    return status;
-}
-
 /* Spots inside the triangles of one of the meshes; those with corners that do not count do not. */
 static ovoid_status look_inside(const ov_judge *judge, ov_meter *meter, ov_facets *to,
                                 const ov_trail *from, const float *distance, double least,
                                 trial *t) {
-    looking l = {judge, t};
+    ov_listing listing = {judge->context, &t->inside};
     const ov_limits limits = {
-        .limit = least, .slack = judge->slack, .found = add_inside, .user = &l};
+        .limit = least, .slack = judge->slack, .found = ov_list_spot, .user = &listing};
     bool whole, outer;
     float *const counted =
         ov_alloc(judge->context, from->mesh->vertices, sizeof *counted, "distances");
     if (!counted)
         return OVOID_ERROR_MEMORY;
     for (size_t v = 0; v < from->mesh->vertices; ++v)
-        counted[v] =
-            counts(judge, from->mesh, v, distance[v], &outer) && outer ? distance[v] : -1.0f;
+        counted[v] = ov_judge_counts(judge, from->mesh, NULL, v, distance[v], &outer) && outer
+                         ? distance[v]
+                         : -1.0f;
     const ovoid_status status =
         ov_bound_exceed(judge->context, meter, to, from, counted, &limits, &whole);
     free(counted);
@@ -363,22 +291,22 @@ static ovoid_status look_inside_both(ov_judge *judge, double least, trial *t,
     OV_TRY(look_inside(judge, &judge->meter, &judge->other, &judge->trail, t->from_original, least,
                        t));
     OV_TRY(look_inside(judge, &judge->back, &judge->facets, &t->trail, t->from_model, least, t));
-    for (size_t n = 0; n < t->inside_count; ++n)
-        judgement->deviation = fmax(judgement->deviation, t->inside[n].distance);
+    for (size_t n = 0; n < t->inside.count; ++n)
+        judgement->deviation = fmax(judgement->deviation, t->inside.spot[n].distance);
     judgement->hausdorff = fmax(judgement->hausdorff, judgement->deviation);
 cleanup:
     return status;
 }
 
-static double enough_of(const ov_judge *judge, double least) {
+double ov_judge_enough(const ov_judge *judge, double least) {
     const double reach = judge->slack > 0.0 ? ENOUGH_INSIDE * judge->meshing.spacing : 0.0;
     return fmax(fmin(ENOUGH * least, least - reach), 0.0);
 }
 
-/* *spots: of the trial's surfaces; free with free(). */
-static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least, double apart,
-                                  size_t most, ov_spot **spots, size_t *spot_count) {
-    size_t room = t->inside_count;
+/* *spots: of the trial's surfaces, in no order; free with free(). */
+static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least, ov_spot **spots,
+                                  size_t *spot_count) {
+    size_t room = t->inside.count;
     *spot_count = 0;
     add_spots(judge, judge->mesh, t->from_original, least, NULL, &room);
     add_spots(judge, t->mesh, t->from_model, least, NULL, &room);
@@ -387,31 +315,90 @@ static ovoid_status collect_spots(ov_judge *judge, const trial *t, double least,
         return OVOID_ERROR_MEMORY;
     add_spots(judge, judge->mesh, t->from_original, least, *spots, spot_count);
     add_spots(judge, t->mesh, t->from_model, least, *spots, spot_count);
-    for (size_t n = 0; n < t->inside_count; ++n)
-        (*spots)[(*spot_count)++] = t->inside[n];
-    return ov_spots_thin(judge->context, *spots, spot_count, apart, most);
+    for (size_t n = 0; n < t->inside.count; ++n)
+        (*spots)[(*spot_count)++] = t->inside.spot[n];
+    return OVOID_OK;
 }
 
-ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
-                            double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
-                            size_t *spot_count) {
+/* All of them, of all of the model. */
+static ovoid_status look_everywhere(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                    double least, ov_judgement *judgement, ov_spot **spots,
+                                    size_t *spot_count) {
     ovoid_status status = OVOID_OK;
     trial t = {0};
+    judge->seen.known = false;
+    OV_TRY(try_model(judge, quadrics, count, ov_judge_enough(judge, least), &t, NULL, judgement));
+    if (!judgement->valid)
+        goto cleanup;
+    if (judge->slack > 0.0)
+        OV_TRY(look_inside_both(judge, least, &t, judgement));
+    OV_TRY(collect_spots(judge, &t, least, spots, spot_count));
+    OV_TRY(ov_judge_remember(judge, quadrics, count, t.mesh, least, *spots, *spot_count));
+cleanup:
+    trial_destroy(&t);
+    return status;
+}
+
+/* All of them, where these are all near what has changed. */
+static ovoid_status look_near(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                              double least, ov_judgement *judgement, ov_spot **spots,
+                              size_t *spot_count, bool *looked) {
+    ov_spot_list found = {0};
+    const ovoid_status status = ov_judge_near(judge, quadrics, count, least, &found, looked);
+    *judgement =
+        (ov_judgement){.valid = true, .area_error = NAN, .volume_ratio = NAN, .score = NAN};
+    for (size_t n = 0; n < found.count; ++n)
+        judgement->deviation = fmax(judgement->deviation, found.spot[n].distance);
+    judgement->hausdorff = judgement->deviation;
+    *spots = found.spot;
+    *spot_count = found.count;
+    return status;
+}
+
+/* near_will_do: also where there are none near what has changed. */
+static ovoid_status look(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
+                         bool near_will_do, ov_judgement *judgement, ov_spot **spots,
+                         size_t *spot_count, bool *whole) {
+    bool looked;
+    const ovoid_status status =
+        look_near(judge, quadrics, count, least, judgement, spots, spot_count, &looked);
+    *whole = !looked || (*spot_count == 0 && !near_will_do);
+    if (status != OVOID_OK || !*whole)
+        return status;
+    free(*spots);
     *spots = NULL;
     *spot_count = 0;
-    OV_TRY(try_model(judge, quadrics, count, enough_of(judge, least), &t, NULL, judgement));
-    if (judgement->valid && judge->slack > 0.0)
-        OV_TRY(look_inside_both(judge, least, &t, judgement));
-    if (judgement->valid)
-        OV_TRY(collect_spots(judge, &t, least, apart, most, spots, spot_count));
-cleanup:
+    return look_everywhere(judge, quadrics, count, least, judgement, spots, spot_count);
+}
+
+/* Leaves those that are wanted, or none after a failure. */
+static ovoid_status thin(ov_judge *judge, ovoid_status status, double apart, size_t most,
+                         ov_spot **spots, size_t *spot_count) {
+    if (status == OVOID_OK)
+        status = ov_spots_thin(judge->context, *spots, spot_count, apart, most);
     if (status != OVOID_OK) {
         free(*spots);
         *spots = NULL;
         *spot_count = 0;
     }
-    trial_destroy(&t);
     return status;
+}
+
+ovoid_status ov_judge_spots_near(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                 double least, double apart, size_t most, ov_judgement *judgement,
+                                 ov_spot **spots, size_t *spot_count, bool *whole) {
+    const ovoid_status status =
+        look(judge, quadrics, count, least, true, judgement, spots, spot_count, whole);
+    return thin(judge, status, apart, most, spots, spot_count);
+}
+
+ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
+                            double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
+                            size_t *spot_count) {
+    bool whole;
+    const ovoid_status status =
+        look(judge, quadrics, count, least, false, judgement, spots, spot_count, &whole);
+    return thin(judge, status, apart, most, spots, spot_count);
 }
 
 ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,

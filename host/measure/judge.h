@@ -22,6 +22,24 @@ bool ov_spots_near(const ov_spot *spots, size_t count, const double at[3], doubl
 ovoid_status ov_spots_thin(ovoid_context *context, ov_spot *spots, size_t *count, double apart,
                            size_t most);
 
+typedef struct ov_spot_list {
+    ov_spot *spot; /* owned */
+    size_t count, capacity;
+} ov_spot_list;
+
+/* What a judge knows of the model whose spots it was asked for last. */
+typedef struct ov_seen {
+    bool known;
+    double least, slack; /* which spots */
+    bool whole;
+    ov_quadric *quadric; /* the model: owned, `count` of them */
+    size_t count, capacity;
+    ov_spot_list spots; /* all of them */
+    double *hidden;     /* owned: 3 * hidden_count, the vertices that are of no outer surface */
+    size_t hidden_count, hidden_capacity;
+    double low[3], high[3]; /* of the mesh when all of it was judged */
+} ov_seen;
+
 /* The original's surface, meshed once: a light mesh without normals, whose triangles stay on the
  * device. mesh is NULL where the field never reaches the isovalue. */
 typedef struct ov_judge {
@@ -34,12 +52,15 @@ typedef struct ov_judge {
     double root_2d; /* sqrt(2 decay), angstrom^-1 */
     ov_watch watch; /* asked during whatever takes long */
     ov_marcher *marcher;
-    ov_meter meter, back;   /* of distances from the original, and to it */
-    ov_facets facets;       /* of the original, */
-    bool laid;              /* once these are there */
-    ov_facets other;        /* of the model at hand */
-    double slack;           /* set by the owner, see ov_judge_spots() */
-    bool whole;             /* set by the owner: walls of cavities count as outer surfaces do */
+    ov_meter meter, back; /* of distances from the original, and to it */
+    ov_facets facets;     /* of the original, */
+    bool laid;            /* once these are there */
+    ov_facets other;      /* of the model at hand */
+    ov_seen seen;
+    ov_marcher *near_marcher; /* of what is near changes, */
+    ov_facets near;           /* and the triangles there */
+    double slack;             /* set by the owner, see ov_judge_spots() */
+    bool whole;               /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;         /* set by the owner: only the surfaces within this box count, and not */
     double low[3], high[3]; /* their areas: beyond it they may be cut off, */
     double stray;           /* unless they are farther off than that, angstrom */
@@ -75,10 +96,18 @@ ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t 
  * deviation are filled in, exact where they are not much below `least`, else only bounds. Of
  * vertices alone, unless the judge's slack (angstrom) is above 0: then points inside triangles are
  * looked for, too, and where none is found no point of the outer meshes is farther than `least` and
- * the slack, unless the meshes are too coarse to tell that of so small a distance. */
+ * the slack, unless the meshes are too coarse to tell that of so small a distance. Where little of
+ * the model has changed since it was asked about last, spots are looked for near that alone, and
+ * all of it is judged only where there are none. */
 ovoid_status ov_judge_spots(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
                             double apart, size_t most, ov_judgement *judgement, ov_spot **spots,
                             size_t *spot_count);
+
+/* The same, but where there are none near what has changed, that is all that is known: *whole tells
+ * whether all of the model was judged. */
+ovoid_status ov_judge_spots_near(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                 double least, double apart, size_t most, ov_judgement *judgement,
+                                 ov_spot **spots, size_t *spot_count, bool *whole);
 
 /* The model's volume over the original's; 1 where there is nothing to compare. */
 ovoid_status ov_judge_volume(ov_judge *judge, const ov_quadric *quadrics, size_t count,

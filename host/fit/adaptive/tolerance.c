@@ -8,29 +8,48 @@ bool ov_trial_holds(const ov_trial *t, double tolerance) {
     return t->judgement.valid && t->judgement.deviation <= tolerance;
 }
 
+/* whole: as of ov_judge_spots_near(); NULL: all of the model is judged before it is said to hold.
+ */
 static ovoid_status find_spots(ov_adaptive *f, ov_judge *judge, ov_trial *t, double tolerance,
-                               size_t most, ov_spots *spots) {
+                               size_t most, ov_spots *spots, bool *whole) {
     ov_spots_destroy(spots);
     ov_adaptive_quadrics(f, t);
     const size_t count = ov_adaptive_surround(f, t->count);
     const ovoid_status status =
-        ov_judge_spots(judge, f->quadrics, count, tolerance, ov_tuned.spots_apart, most,
-                       &t->judgement, &spots->spot, &spots->count);
+        whole ? ov_judge_spots_near(judge, f->quadrics, count, tolerance, ov_tuned.spots_apart,
+                                    most, &t->judgement, &spots->spot, &spots->count, whole)
+              : ov_judge_spots(judge, f->quadrics, count, tolerance, ov_tuned.spots_apart, most,
+                               &t->judgement, &spots->spot, &spots->count);
     if (status == OVOID_OK && (!t->judgement.valid || t->judgement.deviation <= tolerance))
         spots->count = 0;
     return status;
 }
 
+/* By both judges. What holds by the first near its changes is likely to hold elsewhere: whether it
+ * does is looked at when it holds by the second one. */
+static ovoid_status find_spots_closely(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
+                                       ov_spots *spots) {
+    ovoid_status status = OVOID_OK;
+    bool whole;
+    OV_TRY(find_spots(f, &f->judge, t, tolerance, most, spots, &whole));
+    const ov_judgement coarse = t->judgement;
+    if (!ov_trial_holds(t, tolerance))
+        return OVOID_OK;
+    OV_TRY(find_spots(f, &f->fine, t, tolerance, most, spots, NULL));
+    if (!ov_trial_holds(t, tolerance))
+        return OVOID_OK;
+    if (whole) /* what is told is what meshes of the spacing tell */
+        t->judgement.deviation = coarse.deviation;
+    else
+        OV_TRY(find_spots(f, &f->judge, t, tolerance, most, spots, NULL));
+cleanup:
+    return status;
+}
+
 ovoid_status ov_adaptive_spots(ov_adaptive *f, ov_trial *t, double tolerance, size_t most,
                                ov_spots *spots) {
-    ovoid_status status = find_spots(f, &f->judge, t, tolerance, most, spots);
-    const double coarse = t->judgement.deviation;
-    if (status != OVOID_OK || !f->finely || !ov_trial_holds(t, tolerance))
-        return status;
-    status = find_spots(f, &f->fine, t, tolerance, most, spots);
-    if (ov_trial_holds(t, tolerance)) /* by both: what is told is what meshes of the spacing tell */
-        t->judgement.deviation = coarse;
-    return status;
+    return f->finely ? find_spots_closely(f, t, tolerance, most, spots)
+                     : find_spots(f, &f->judge, t, tolerance, most, spots, NULL);
 }
 
 ovoid_status ov_adaptive_emphasise(ov_adaptive *f, const ov_spots *spots, double reach,

@@ -1,0 +1,41 @@
+/*
+ * What judging a whole model and judging it near its changes have in common.
+ */
+#ifndef OV_JUDGING_H
+#define OV_JUDGING_H
+
+#include "measure/bound.h"
+#include "measure/judge.h"
+
+/* Whether a vertex that is so far off counts; *outer: as one of an outer surface. exposed: whether
+ * each vertex is of such a surface; NULL: as the mesh says. */
+bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, const bool *exposed,
+                     size_t vertex, double distance, bool *outer);
+
+/* Distances below this are only bounded where spots are looked for that are `least` off. */
+double ov_judge_enough(const ov_judge *judge, double least);
+
+/* Adds a spot to the list `spots` of a judge. */
+typedef struct ov_listing {
+    ovoid_context *context;
+    ov_spot_list *spots;
+} ov_listing;
+ovoid_status ov_list_spot(const double at[3], double distance, void *listing);
+
+/* ---- near changes (near.c) ------------------------------------------------------------------- */
+
+/* Looks for spots only where the model is not what it was when it was seen last, and takes note of
+ * what it is now. *looked is false, and nothing done, where that is not enough to know them all, or
+ * little less work than to judge all of it. What is not known for sure is whether there are none:
+ * only a whole judgement says so. */
+ovoid_status ov_judge_near(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
+                           ov_spot_list *found, bool *looked);
+
+/* Takes note of a model and its mesh, all of which was judged, and of all the spots there are. */
+ovoid_status ov_judge_remember(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                               const ovoid_mesh *mesh, double least, const ov_spot *spots,
+                               size_t spot_count);
+
+void ov_seen_destroy(ov_seen *seen);
+
+#endif

@@ -1,0 +1,266 @@
+/*
+ * Judging models near their changes: what is found there is what judging all of the model finds.
+ */
+#include "measure/changes.h"
+#include "measure/judge.h"
+#include "support.h"
+
+/* ---- boxes ------------------------------------------------------------------------------------
+ */
+
+static ov_quadric ball(double x, double y, double z) {
+    const double xyzr[4] = {x, y, z, 1.6};
+    ov_quadric quadric;
+    ov_quadric_of_atom(xyzr, 0.5, &quadric);
+    return quadric;
+}
+
+/* Boxes about what differs between two mixtures. */
+static size_t boxes_of(ovoid_context *context, const ov_quadric *before, size_t befores,
+                       const ov_quadric *now, size_t nows, ov_box box[OV_CHANGES_MOST], bool *few) {
+    const ov_change change = {.before = before,
+                              .before_count = befores,
+                              .now = now,
+                              .now_count = nows,
+                              .floor = 0.01,
+                              .about = 1.0,
+                              .room = 2.0};
+    size_t count = 99;
+    test_check(context, ov_changes_find(context, &change, box, &count, few));
+    return count;
+}
+
+static void boxes_are_about_changes(void **state) {
+    enum { COUNT = 40 };
+    ov_quadric before[COUNT], now[COUNT + 1];
+    ov_box box[OV_CHANGES_MOST];
+    double half[3];
+    bool few;
+    for (size_t i = 0; i < COUNT; ++i) {
+        before[i] = ball(3.0 * (double)i, 0.0, 0.0);
+        now[COUNT - 1 - i] = before[i];
+    }
+    assert_int_equal(boxes_of(*state, before, COUNT, now, COUNT, box, &few), 0);
+    assert_true(few);
+    now[7].centre[1] += 0.5; /* where it was and where it is now, in one box */
+    assert_int_equal(boxes_of(*state, before, COUNT, now, COUNT, box, &few), 1);
+    assert_true(ov_quadric_reach(&now[7], 0.01, half));
+    expect_near(box[0].low[0], now[7].centre[0] - half[0] - 1.0, 1e-12, "low x");
+    expect_near(box[0].low[1], -half[1] - 1.0, 1e-12, "low y");
+    expect_near(box[0].high[1], 0.5 + half[1] + 1.0, 1e-12, "high y");
+    now[30].amplitude *= 1.5; /* far away: another one */
+    assert_int_equal(boxes_of(*state, before, COUNT, now, COUNT, box, &few), 2);
+    now[COUNT] = ball(3.0 * (COUNT - 8), 1.0, 0.0); /* added near the first */
+    assert_int_equal(boxes_of(*state, before, COUNT, now, COUNT + 1, box, &few), 2);
+    assert_int_equal(boxes_of(*state, before, COUNT - 1, before, COUNT, box, &few), 1);
+    assert_int_equal(boxes_of(*state, NULL, 0, before, COUNT, box, &few), 1); /* a row of them */
+    assert_true(few);
+    for (size_t i = 0; i < COUNT; ++i)
+        before[i].amplitude = 0.005; /* nowhere as much as counts */
+    assert_int_equal(boxes_of(*state, before, COUNT, NULL, 0, box, &few), 0);
+    assert_true(few);
+}
+
+static void too_many_changes(void **state) {
+    enum { COUNT = OV_CHANGES_MOST + 1 };
+    ov_quadric *const all = test_alloc(COUNT, sizeof *all);
+    ov_box box[OV_CHANGES_MOST];
+    bool few;
+    for (size_t i = 0; i < COUNT; ++i)
+        all[i] = ball(100.0 * (double)i, 0.0, 0.0);
+    assert_int_equal(boxes_of(*state, NULL, 0, all, OV_CHANGES_MOST, box, &few), OV_CHANGES_MOST);
+    assert_true(few);
+    assert_int_equal(boxes_of(*state, NULL, 0, all, COUNT, box, &few), 0);
+    assert_false(few);
+    free(all);
+}
+
+/* ---- spots ------------------------------------------------------------------------------------
+ */
+
+enum { RINGS = 76, EACH = 12, ENDS = 7, FILLING = RINGS / 4, ATOMS = RINGS * EACH + 2 * ENDS };
+enum { GAUSSIANS = ATOMS + FILLING };
+#define LEAST 0.5
+#define APART 1.9 /* rings */
+
+/* A tube that is closed at both ends: its cavity runs through all of it. */
+static void make_atoms(double xyzr[4 * ATOMS]) {
+    for (size_t i = 0; i < RINGS * EACH; ++i) {
+        const double turn = 2.0 * 3.14159265 * ((double)i / EACH + 0.5 * (double)(i / EACH % 2));
+        const double at[4] = {APART * (double)(i / EACH), 4.5 * cos(turn), 4.5 * sin(turn), 1.5};
+        memcpy(xyzr + 4 * i, at, sizeof at);
+    }
+    for (size_t i = 0; i < 2 * ENDS; ++i) {
+        const double turn = 2.0 * 3.14159265 * (double)(i / 2) / (ENDS - 1),
+                     radius = i / 2 < ENDS - 1 ? 2.5 : 0.0;
+        const double at[4] = {i % 2 ? APART * (RINGS - 1) : 0.0, radius * cos(turn),
+                              radius * sin(turn), 1.7};
+        memcpy(xyzr + 4 * (RINGS * EACH + i), at, sizeof at);
+    }
+}
+
+/* The atoms, and what makes the cavity smaller all along, which no outer surface shows. */
+static void make_model(const double xyzr[4 * ATOMS], ov_quadric quadrics[GAUSSIANS + 1]) {
+    for (size_t i = 0; i < ATOMS; ++i)
+        ov_quadric_of_atom(xyzr + 4 * i, 0.5, &quadrics[i]);
+    for (size_t i = 0; i < FILLING; ++i)
+        quadrics[ATOMS + i] = ball(APART * (double)(4 * i + 2), 2.3, 0.0);
+}
+
+/* Makes the tube thicker at an atom, or moves the atom: the cavity stays closed. Returns how many
+ * there are. */
+static size_t change(test_random *random, size_t i, ov_quadric quadrics[GAUSSIANS + 1]) {
+    const double way = random_uniform(random, 0.0, 1.0);
+    size_t count = GAUSSIANS;
+    if (way < 0.4)
+        quadrics[i].amplitude *= random_uniform(random, 1.5, 8.0);
+    else if (way < 0.8) {
+        quadrics[count] = quadrics[i];
+        for (size_t k = 1; k < 3; ++k)
+            quadrics[count].centre[k] *= random_uniform(random, 1.0, 1.6);
+        ++count;
+    } else
+        for (size_t k = 0; k < 3; ++k)
+            quadrics[i].centre[k] += random_uniform(random, -0.2, 0.2);
+    return count;
+}
+
+static bool has(const ov_spot *spots, size_t count, const ov_spot *one) {
+    for (size_t n = 0; n < count; ++n) {
+        double square = 0.0;
+        for (size_t k = 0; k < 3; ++k)
+            square += (spots[n].at[k] - one->at[k]) * (spots[n].at[k] - one->at[k]);
+        if (square < 1e-4 && fabs(spots[n].distance - one->distance) < 1e-3)
+            return true;
+    }
+    return false;
+}
+
+/* All of one are in the other, those aside that hardly count. */
+static void expect_among(const ov_spot *some, size_t count, const ov_spot *all, size_t all_count) {
+    for (size_t n = 0; n < count; ++n)
+        if (some[n].distance > LEAST + 1e-3 && !has(all, all_count, &some[n]))
+            fail_msg("the spot %g off at %g, %g, %g is missing", some[n].distance, some[n].at[0],
+                     some[n].at[1], some[n].at[2]);
+}
+
+/* Two judges of the same: one knows what it saw before. */
+typedef struct judges {
+    ov_judge knows, knows_not;
+    size_t near, found, known; /* judgements near changes, those with spots, and all of them */
+} judges;
+
+static void judge_both(ovoid_context *context, judges *j, const ov_quadric *quadrics,
+                       size_t count) {
+    ov_judgement judgement, expected;
+    ov_spot *spots = NULL, *all = NULL;
+    size_t spot_count = 0, all_count = 0;
+    bool whole;
+    test_check(context, ov_judge_spots_near(&j->knows, quadrics, count, LEAST, 0.0, SIZE_MAX,
+                                            &judgement, &spots, &spot_count, &whole));
+    j->knows_not.seen.known = false;
+    test_check(context, ov_judge_spots(&j->knows_not, quadrics, count, LEAST, 0.0, SIZE_MAX,
+                                       &expected, &all, &all_count));
+    expect_among(spots, spot_count, all, all_count);
+    expect_among(all, all_count, spots, spot_count);
+    if (spot_count > 0)
+        expect_near(judgement.deviation, expected.deviation, 1e-4, "deviation");
+    ++j->known;
+    j->near += !whole;
+    j->found += !whole && spot_count > 0;
+    free(spots);
+    free(all);
+}
+
+/* Changes at one place after another, and one more at each. */
+static void follow(ovoid_context *context, double slack) {
+    double *const xyzr = test_alloc(4 * (size_t)ATOMS, sizeof *xyzr);
+    ov_quadric *const base = test_alloc(2 * (size_t)(GAUSSIANS + 1), sizeof *base),
+                      *const quadrics = base + GAUSSIANS + 1;
+    test_random random = {9};
+    judges j = {.near = 0};
+    make_atoms(xyzr);
+    make_model(xyzr, base);
+    test_check(context,
+               ov_judge_create(context, xyzr, ATOMS, 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows));
+    test_check(context,
+               ov_judge_create(context, xyzr, ATOMS, 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows_not));
+    j.knows.slack = j.knows_not.slack = slack;
+    judge_both(context, &j, base, GAUSSIANS);
+    assert_true(j.knows.seen.spots.count == 0 && j.knows.seen.hidden_count > 1000);
+    for (size_t round = 0; round < 10; ++round) {
+        const size_t place = (size_t)random_uniform(&random, 0.0, RINGS * EACH - 6);
+        memcpy(quadrics, base, (GAUSSIANS + 1) * sizeof *base);
+        size_t count = change(&random, place, quadrics);
+        judge_both(context, &j, quadrics, count);
+        if (count == GAUSSIANS)
+            count = change(&random, place + 5, quadrics);
+        judge_both(context, &j, quadrics, count);
+        judge_both(context, &j, base, GAUSSIANS);
+    }
+    print_message("%zu of %zu near changes, %zu of them with spots\n", j.near, j.known, j.found);
+    assert_true(2 * j.near > j.known && 4 * j.found > j.known);
+    free(xyzr);
+    free(base);
+    ov_judge_destroy(&j.knows);
+    ov_judge_destroy(&j.knows_not);
+}
+
+static void near_is_what_whole_is(void **state) {
+    if (test_small())
+        skip(); /* a cavity takes many atoms */
+    follow(*state, 0.0);
+    follow(*state, 0.002);
+}
+
+/* What was seen of another tolerance, slack or kind of surface, or before a search, is no help. */
+static void other_questions(void **state) {
+    if (test_small())
+        skip();
+    double *const xyzr = test_alloc(4 * (size_t)ATOMS, sizeof *xyzr);
+    ov_quadric *const quadrics = test_alloc(GAUSSIANS + 1, sizeof *quadrics);
+    ov_judge judge;
+    ov_judgement judgement;
+    bool whole;
+    make_atoms(xyzr);
+    make_model(xyzr, quadrics);
+    test_check(*state, ov_judge_create(*state, xyzr, ATOMS, 0.5, 1.0, 0.5, (ov_watch){0}, &judge));
+    for (int n = 0; n < 8; ++n) {
+        ov_spot *spots;
+        size_t spot_count;
+        judge.slack = n >= 4 ? 0.002 : 0.0;
+        if (n == 6)
+            ov_judge_begin(&judge);
+        judge.whole = n == 7;
+        quadrics[100].centre[1] += 0.01;
+        test_check(*state, ov_judge_spots_near(&judge, quadrics, GAUSSIANS, n >= 2 ? 0.6 : LEAST,
+                                               1.0, 9, &judgement, &spots, &spot_count, &whole));
+        print_message("%d: %s, %zu spots\n", n, whole ? "whole" : "near", spot_count);
+        assert_true(whole == (n % 2 == 0 || n == 7));
+        assert_true((spot_count > 0) == (n == 7));
+        free(spots);
+    }
+    judge.whole = false; /* and where none is found it is looked for everywhere, if need be */
+    for (int n = 0; n < 2; ++n) {
+        ov_spot *spots;
+        size_t spot_count;
+        quadrics[100].centre[1] += 0.01;
+        test_check(*state, ov_judge_spots(&judge, quadrics, GAUSSIANS, 0.6, 1.0, 9, &judgement,
+                                          &spots, &spot_count));
+        assert_true(spot_count == 0 && judgement.deviation > 0.05);
+        free(spots);
+    }
+    free(xyzr);
+    free(quadrics);
+    ov_judge_destroy(&judge);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(boxes_are_about_changes),
+        cmocka_unit_test(too_many_changes),
+        cmocka_unit_test(near_is_what_whole_is),
+        cmocka_unit_test(other_questions),
+    };
+    return cmocka_run_group_tests(tests, test_open, test_close);
+}

@@ -46,7 +46,7 @@ host/fit/adaptive/refine.c|refine|no bound of axes|s/^    ov_factor_bound_decay(
 host/fit/adaptive/adaptive.c|+adaptive|calibration in the wrong direction|s/(1.0 - volume_ratio) \/ per_log/(volume_ratio - 1.0) \/ per_log/
 host/fit/adaptive/local.c|local|points are not found anew|s/m->escaped =$/m->escaped = false \&\&/
 host/fit/adaptive/merge.c|merge|a split forgets the variance|s/half.decay\[2\] \/= shrink;//
-host/measure/judge.c|judge|spots are not thinned|s/if (square < apart \* apart)/if (false)/
+host/measure/spots.c|judge|spots are not thinned|s/if (square < apart \* apart)/if (false)/
 host/measure/near.c|near|no piece that leaves the box is hidden|s/seen->hidden_count == 0 || ov_grid_near/true || ov_grid_near/
 host/measure/near.c|near|the end of a mesh joins what it cuts|s/find_pieces(e->mesh, &e->sure, piece)/find_pieces(e->mesh, \&(ov_box){{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}}, piece)/
 host/measure/near.c|near|spots elsewhere are forgotten|s/if (!is_in_any(n, seen->spots.spot\[k\].at))/if (!is_in_any(n, seen->spots.spot[k].at) \&\& false)/

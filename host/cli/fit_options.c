@@ -39,7 +39,7 @@ const cli_number fit_adaptive_numbers[] = {
         "effort", adaptive.effort, 0, 10,
         "how much is tried for a better model, up to 10: more starts, more repairs, more time; 0, "
         "of so many ellipsoids: the largest distances are not brought down, which takes most of "
-        "the time; to a tolerance: soon content, with a few percent more ellipsoids"),
+        "the time; to a tolerance: soon content, with some more ellipsoids"),
     COUNT("steps", adaptive.steps, 0, UINT32_MAX,
           "steps of each refinement (Levenberg-Marquardt) at most; 0 leaves the merged Gaussians "
           "as they are"),

@@ -244,7 +244,7 @@ static ovoid_status mesh_excerpt(const nearby *n, excerpt *e) {
     OV_TRY(ov_mesh_finish(judge->context, e->mesh));
 cleanup:
     if (status == OVOID_ERROR_EMPTY || status == OVOID_ERROR_LIMIT) {
-        e->mesh = NULL;
+        ovoid_mesh_destroy(&e->mesh);
         status = OVOID_OK;
     }
     free(bodies);

@@ -241,7 +241,7 @@ class Molecule(Pictured):
         effort : int, optional
             1 (default) to 10: more starts and repairs, more time. 0, of so many ellipsoids:
             the largest distances are not brought down, in a fraction of the time; to a
-            tolerance: soon content, with a few percent more ellipsoids.
+            tolerance: soon content, with some more ellipsoids.
         steps : int, optional
             Of each refinement at most (default 60).
         part_atoms : int, optional

@@ -50,7 +50,7 @@ host/measure/spots.c|judge|spots are not thinned|s/if (square < apart \* apart)/
 host/measure/near.c|near|no piece that leaves the box is hidden|s/seen->hidden_count == 0 || ov_grid_near/true || ov_grid_near/
 host/measure/near.c|near|the end of a mesh joins what it cuts|s/find_pieces(e->mesh, &e->sure, piece)/find_pieces(e->mesh, \&(ov_box){{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}}, piece)/
 host/measure/near.c|near|spots elsewhere are forgotten|s/if (!is_in_any(n, seen->spots.spot\[k\].at))/if (!is_in_any(n, seen->spots.spot[k].at) \&\& false)/
-host/measure/judge.c|near|none near changes are none|s/(\*spot_count == 0 \&\& !near_will_do)/(near_will_do \&\& false)/
+host/measure/judge.c|+near|none near changes are none|s/(\*spot_count == 0 \&\& !near_will_do)/(near_will_do \&\& false)/
 host/mesh/components.c|mesh|walls of cavities are outer|s/mesh->component\[c\].outer = mesh->component\[c\].volume > 0.0;/mesh->component[c].outer = true;/
 host/mixture/reduce.c|reduce|partners that are used up are not looked for again|s/if (list->next == list->count \&\& list->more)/if (false)/
 host/molecule/pqr.c|molecule|a PDB file is not suspected|s/return !pdb->cleared \&\& atoms > 1/return false \&\& atoms > 1/

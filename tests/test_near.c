@@ -78,14 +78,26 @@ static void too_many_changes(void **state) {
 /* ---- spots ------------------------------------------------------------------------------------
  */
 
-enum { RINGS = 76, EACH = 12, ENDS = 7, FILLING = RINGS / 4, ATOMS = RINGS * EACH + 2 * ENDS };
-enum { GAUSSIANS = ATOMS + FILLING };
+enum { EACH = 12, ENDS = 7 }; /* atoms of a ring and of an end */
 #define LEAST 0.5
 #define APART 1.9 /* rings */
 
+static size_t rings(void) {
+    return test_size(76, 24);
+}
+
+static size_t atoms(void) {
+    return rings() * EACH + 2 * ENDS;
+}
+
+/* Of a model. */
+static size_t gaussians(void) {
+    return atoms() + rings() / 4;
+}
+
 /* A tube that is closed at both ends: its cavity runs through all of it. */
-static void make_atoms(double xyzr[4 * ATOMS]) {
-    for (size_t i = 0; i < RINGS * EACH; ++i) {
+static void make_atoms(double *xyzr) {
+    for (size_t i = 0; i < rings() * EACH; ++i) {
         const double turn = 2.0 * 3.14159265 * ((double)i / EACH + 0.5 * (double)(i / EACH % 2));
         const double at[4] = {APART * (double)(i / EACH), 4.5 * cos(turn), 4.5 * sin(turn), 1.5};
         memcpy(xyzr + 4 * i, at, sizeof at);
@@ -93,25 +105,25 @@ static void make_atoms(double xyzr[4 * ATOMS]) {
     for (size_t i = 0; i < 2 * ENDS; ++i) {
         const double turn = 2.0 * 3.14159265 * (double)(i / 2) / (ENDS - 1),
                      radius = i / 2 < ENDS - 1 ? 2.5 : 0.0;
-        const double at[4] = {i % 2 ? APART * (RINGS - 1) : 0.0, radius * cos(turn),
+        const double at[4] = {i % 2 ? APART * (double)(rings() - 1) : 0.0, radius * cos(turn),
                               radius * sin(turn), 1.7};
-        memcpy(xyzr + 4 * (RINGS * EACH + i), at, sizeof at);
+        memcpy(xyzr + 4 * (rings() * EACH + i), at, sizeof at);
     }
 }
 
 /* The atoms, and what makes the cavity smaller all along, which no outer surface shows. */
-static void make_model(const double xyzr[4 * ATOMS], ov_quadric quadrics[GAUSSIANS + 1]) {
-    for (size_t i = 0; i < ATOMS; ++i)
+static void make_model(const double *xyzr, ov_quadric *quadrics) {
+    for (size_t i = 0; i < atoms(); ++i)
         ov_quadric_of_atom(xyzr + 4 * i, 0.5, &quadrics[i]);
-    for (size_t i = 0; i < FILLING; ++i)
-        quadrics[ATOMS + i] = ball(APART * (double)(4 * i + 2), 2.3, 0.0);
+    for (size_t i = 0; i < rings() / 4; ++i)
+        quadrics[atoms() + i] = ball(APART * (double)(4 * i + 2), 2.3, 0.0);
 }
 
 /* Makes the tube thicker at an atom, or moves the atom: the cavity stays closed. Returns how many
  * there are. */
-static size_t change(test_random *random, size_t i, ov_quadric quadrics[GAUSSIANS + 1]) {
+static size_t change(test_random *random, size_t i, ov_quadric *quadrics) {
     const double way = random_uniform(random, 0.0, 1.0);
-    size_t count = GAUSSIANS;
+    size_t count = gaussians();
     if (way < 0.4)
         quadrics[i].amplitude *= random_uniform(random, 1.5, 8.0);
     else if (way < 0.8) {
@@ -174,32 +186,33 @@ static void judge_both(ovoid_context *context, judges *j, const ov_quadric *quad
 
 /* Changes at one place after another, and one more at each. */
 static void follow(ovoid_context *context, double slack) {
-    double *const xyzr = test_alloc(4 * (size_t)ATOMS, sizeof *xyzr);
-    ov_quadric *const base = test_alloc(2 * (size_t)(GAUSSIANS + 1), sizeof *base),
-                      *const quadrics = base + GAUSSIANS + 1;
+    double *const xyzr = test_alloc(4 * atoms(), sizeof *xyzr);
+    ov_quadric *const base = test_alloc(2 * (gaussians() + 1), sizeof *base), *const quadrics =
+                                                                                  base +
+                                                                                  gaussians() + 1;
     test_random random = {9};
     judges j = {.near = 0};
     make_atoms(xyzr);
     make_model(xyzr, base);
     test_check(context,
-               ov_judge_create(context, xyzr, ATOMS, 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows));
+               ov_judge_create(context, xyzr, atoms(), 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows));
     test_check(context,
-               ov_judge_create(context, xyzr, ATOMS, 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows_not));
+               ov_judge_create(context, xyzr, atoms(), 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows_not));
     j.knows.slack = j.knows_not.slack = slack;
-    judge_both(context, &j, base, GAUSSIANS);
-    assert_true(j.knows.seen.spots.count == 0 && j.knows.seen.hidden_count > 1000);
-    for (size_t round = 0; round < 10; ++round) {
-        const size_t place = (size_t)random_uniform(&random, 0.0, RINGS * EACH - 6);
-        memcpy(quadrics, base, (GAUSSIANS + 1) * sizeof *base);
+    judge_both(context, &j, base, gaussians());
+    assert_true(j.knows.seen.spots.count == 0 && j.knows.seen.hidden_count > 500);
+    for (size_t round = 0; round < test_size(10, 3); ++round) {
+        const size_t place = (size_t)random_uniform(&random, 0.0, (double)(rings() * EACH - 6));
+        memcpy(quadrics, base, (gaussians() + 1) * sizeof *base);
         size_t count = change(&random, place, quadrics);
         judge_both(context, &j, quadrics, count);
-        if (count == GAUSSIANS)
+        if (count == gaussians())
             count = change(&random, place + 5, quadrics);
         judge_both(context, &j, quadrics, count);
-        judge_both(context, &j, base, GAUSSIANS);
+        judge_both(context, &j, base, gaussians());
     }
     print_message("%zu of %zu near changes, %zu of them with spots\n", j.near, j.known, j.found);
-    assert_true(2 * j.near > j.known && 4 * j.found > j.known);
+    assert_true(2 * j.near > j.known && j.found >= test_size(8, 1));
     free(xyzr);
     free(base);
     ov_judge_destroy(&j.knows);
@@ -207,24 +220,27 @@ static void follow(ovoid_context *context, double slack) {
 }
 
 static void near_is_what_whole_is(void **state) {
-    if (test_small())
-        skip(); /* a cavity takes many atoms */
-    follow(*state, 0.0);
+    test_skip_simulated(*state); /* a cavity takes many atoms */
+    if (strstr(ovoid_context_device(*state)->platform, "rusticl"))
+        skip();        /* it prepares kernels at each launch */
+    if (!test_small()) /* a box is too large a share of a short tube */
+        follow(*state, 0.0);
     follow(*state, 0.002);
 }
 
 /* What was seen of another tolerance, slack or kind of surface, or before a search, is no help. */
 static void other_questions(void **state) {
-    if (test_small())
+    if (test_small()) /* as above */
         skip();
-    double *const xyzr = test_alloc(4 * (size_t)ATOMS, sizeof *xyzr);
-    ov_quadric *const quadrics = test_alloc(GAUSSIANS + 1, sizeof *quadrics);
+    double *const xyzr = test_alloc(4 * atoms(), sizeof *xyzr);
+    ov_quadric *const quadrics = test_alloc(gaussians() + 1, sizeof *quadrics);
     ov_judge judge;
     ov_judgement judgement;
     bool whole;
     make_atoms(xyzr);
     make_model(xyzr, quadrics);
-    test_check(*state, ov_judge_create(*state, xyzr, ATOMS, 0.5, 1.0, 0.5, (ov_watch){0}, &judge));
+    test_check(*state,
+               ov_judge_create(*state, xyzr, atoms(), 0.5, 1.0, 0.5, (ov_watch){0}, &judge));
     for (int n = 0; n < 8; ++n) {
         ov_spot *spots;
         size_t spot_count;
@@ -233,7 +249,7 @@ static void other_questions(void **state) {
             ov_judge_begin(&judge);
         judge.whole = n == 7;
         quadrics[100].centre[1] += 0.01;
-        test_check(*state, ov_judge_spots_near(&judge, quadrics, GAUSSIANS, n >= 2 ? 0.6 : LEAST,
+        test_check(*state, ov_judge_spots_near(&judge, quadrics, gaussians(), n >= 2 ? 0.6 : LEAST,
                                                1.0, 9, &judgement, &spots, &spot_count, &whole));
         print_message("%d: %s, %zu spots\n", n, whole ? "whole" : "near", spot_count);
         assert_true(whole == (n % 2 == 0 || n == 7));
@@ -245,7 +261,7 @@ static void other_questions(void **state) {
         ov_spot *spots;
         size_t spot_count;
         quadrics[100].centre[1] += 0.01;
-        test_check(*state, ov_judge_spots(&judge, quadrics, GAUSSIANS, 0.6, 1.0, 9, &judgement,
+        test_check(*state, ov_judge_spots(&judge, quadrics, gaussians(), 0.6, 1.0, 9, &judgement,
                                           &spots, &spot_count));
         assert_true(spot_count == 0 && judgement.deviation > 0.05);
         free(spots);

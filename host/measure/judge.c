@@ -103,7 +103,6 @@ void ov_judge_destroy(ov_judge *judge) {
     ov_facets_destroy(&judge->other);
     ov_seen_destroy(&judge->seen);
     ov_marcher_destroy(&judge->near_marcher);
-    ov_facets_destroy(&judge->near);
     ov_trail_destroy(&judge->trail);
     ovoid_mesh_destroy(&judge->mesh);
     free(judge->excused);

@@ -55,10 +55,9 @@ typedef struct ov_judge {
     ov_meter meter, back; /* of distances from the original, and to it */
     ov_facets facets;     /* of the original, */
     bool laid;            /* once these are there */
-    ov_facets other;      /* of the model at hand */
+    ov_facets other;      /* of the model at hand, or of a part of it */
     ov_seen seen;
-    ov_marcher *near_marcher; /* of what is near changes, */
-    ov_facets near;           /* and the triangles there */
+    ov_marcher *near_marcher; /* of what is near changes */
     double slack;             /* set by the owner, see ov_judge_spots() */
     bool whole;               /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;         /* set by the owner: only the surfaces within this box count, and not */

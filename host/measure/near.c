@@ -314,14 +314,14 @@ static ovoid_status measure_excerpt(const nearby *n, excerpt *e) {
     judge->meter.enough = judge->back.enough = ov_judge_enough(judge, n->least);
     OV_TRY(choose_original(judge, e));
     OV_TRY(ov_trail_create(context, e->mesh, false, &e->trail));
-    OV_TRY(ov_facets_set(context, &judge->near, &e->trail, judge->origin));
+    OV_TRY(ov_facets_set(context, &judge->other, &e->trail, judge->origin));
     OV_TRY(ov_trail_distances(context, &judge->back, &judge->facets, &e->trail, e->distance));
     OV_TRY(find_spots(n, e, &judge->back, &judge->facets, &e->trail, e->exposed, e->distance));
     if (e->original.vertices == 0)
         goto cleanup;
     OV_TRY(
-        ov_trail_distances(context, &judge->meter, &judge->near, &e->original, e->from_original));
-    OV_TRY(find_spots(n, e, &judge->meter, &judge->near, &e->original, NULL, e->from_original));
+        ov_trail_distances(context, &judge->meter, &judge->other, &e->original, e->from_original));
+    OV_TRY(find_spots(n, e, &judge->meter, &judge->other, &e->original, NULL, e->from_original));
 cleanup:
     return status;
 }

@@ -15,8 +15,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A change counts where it is of at least this share of the isovalue: it moves the surface by a
- * hundredth of an angstrom at most, about. */
+/* A change counts where it is of at least this share of the isovalue: less moves the surface by
+ * less than a hundredth of an angstrom, where the field is as steep as it mostly is. */
 #define FLOOR 0.01
 /* Boxes are larger than that by so many times the distance that spots have at least: places whose
  * nearest points have changed lie in them. */

@@ -5,8 +5,7 @@
 #include "measure/judge.h"
 #include "support.h"
 
-/* ---- boxes ------------------------------------------------------------------------------------
- */
+/* ---- boxes ----------------------------------------------------------------------------------- */
 
 static ov_quadric ball(double x, double y, double z) {
     const double xyzr[4] = {x, y, z, 1.6};
@@ -75,8 +74,7 @@ static void too_many_changes(void **state) {
     free(all);
 }
 
-/* ---- spots ------------------------------------------------------------------------------------
- */
+/* ---- spots ----------------------------------------------------------------------------------- */
 
 enum { EACH = 12, ENDS = 7 }; /* atoms of a ring and of an end */
 #define LEAST 0.5

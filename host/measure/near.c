@@ -82,8 +82,7 @@ static double room_of(const ov_judge *judge, double least) {
     return BEYOND * least + BEYOND_STEPS * judge->meshing.spacing;
 }
 
-/* ---- whether ----------------------------------------------------------------------------------
- */
+/* ---- whether --------------------------------------------------------------------------------- */
 
 static bool is_in_any(const nearby *n, const double at[3]) {
     for (size_t k = 0; k < n->boxes; ++k)
@@ -121,8 +120,7 @@ static bool is_worth_it(const nearby *n) {
     return true;
 }
 
-/* ---- what is exposed --------------------------------------------------------------------------
- */
+/* ---- what is exposed ------------------------------------------------------------------------- */
 
 /* The pieces of a mesh in a box, by their first vertices. */
 static void find_pieces(const ovoid_mesh *mesh, const ov_box *box, uint32_t *piece) {
@@ -174,14 +172,15 @@ cleanup:
 static ovoid_status find_exposed(const ov_judge *judge, excerpt *e) {
     ovoid_status status = OVOID_OK;
     const size_t vertices = e->mesh->vertices;
+    bool *exposed; /* behind leaves */
     uint32_t *const piece = ov_alloc(judge->context, vertices, sizeof *piece, "pieces of a mesh");
     bool *const leaves = ov_alloc(judge->context, 2 * vertices, sizeof *leaves, "pieces of a mesh");
-    bool *const exposed = leaves + vertices; /* not looked at unless it was made */
     e->exposed = ov_alloc(judge->context, vertices, sizeof *e->exposed, "points of a mesh");
     if (!piece || !leaves || !e->exposed) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
     }
+    exposed = leaves + vertices;
     find_pieces(e->mesh, &e->sure, piece);
     OV_TRY(find_leaving(judge, e, piece, leaves, exposed));
     for (size_t v = 0; v < vertices; ++v)
@@ -220,8 +219,7 @@ cleanup:
     return status;
 }
 
-/* ---- in one box -------------------------------------------------------------------------------
- */
+/* ---- in one box ------------------------------------------------------------------------------ */
 
 /* mesh stays NULL where the model has no surface there. */
 static ovoid_status mesh_excerpt(const nearby *n, excerpt *e) {
@@ -342,8 +340,7 @@ cleanup:
     return status;
 }
 
-/* ---- what was seen ----------------------------------------------------------------------------
- */
+/* ---- what was seen --------------------------------------------------------------------------- */
 
 static ovoid_status remember_model(ov_judge *judge, const ov_quadric *quadrics, size_t count,
                                    double least, const ov_spot *spots, size_t spot_count) {
@@ -400,8 +397,7 @@ void ov_seen_destroy(ov_seen *seen) {
     *seen = (ov_seen){0};
 }
 
-/* ---- the whole --------------------------------------------------------------------------------
- */
+/* ---- the whole ------------------------------------------------------------------------------- */
 
 /* Whether what was seen last was asked for in the same way. */
 static bool is_the_same(const ov_judge *judge, double least) {

@@ -32,14 +32,14 @@ static ovoid_status find_spots_closely(ov_adaptive *f, ov_trial *t, double toler
     ovoid_status status = OVOID_OK;
     bool whole;
     OV_TRY(find_spots(f, &f->judge, t, tolerance, most, spots, &whole));
-    const ov_judgement coarse = t->judgement;
+    const double coarse = t->judgement.deviation;
     if (!ov_trial_holds(t, tolerance))
         return OVOID_OK;
     OV_TRY(find_spots(f, &f->fine, t, tolerance, most, spots, NULL));
     if (!ov_trial_holds(t, tolerance))
         return OVOID_OK;
     if (whole) /* what is told is what meshes of the spacing tell */
-        t->judgement.deviation = coarse.deviation;
+        t->judgement.deviation = coarse;
     else
         OV_TRY(find_spots(f, &f->judge, t, tolerance, most, spots, NULL));
 cleanup:

@@ -260,8 +260,8 @@ static void what_strays_counts(void **state) {
     judge.in_region = true;
     judge.stray = judge.excused_times = INFINITY;
     for (int k = 0; k < 3; ++k) {
-        judge.low[k] = two[k] - 3.0;
-        judge.high[k] = two[k] + 3.0;
+        judge.region.low[k] = two[k] - 3.0;
+        judge.region.high[k] = two[k] + 3.0;
     }
     expect_near(judgement_of(*state, &judge, quadrics, 3).deviation, 0.0, 1e-4, "beside it");
     judge.stray = far + error;

@@ -6,6 +6,7 @@
 #ifndef OV_CELLS_H
 #define OV_CELLS_H
 
+#include "base/box.h"
 #include "measure/partition.h"
 #include "measure/survey.h"
 #include "mesh/mesh_of.h"

@@ -5,8 +5,8 @@
 #define OV_CHANGES_H
 
 #include "base/base.h"
+#include "base/box.h"
 #include "field/quadric.h"
-#include "measure/partition.h"
 
 /* Of more Gaussians than this nobody asks where they are. */
 #define OV_CHANGES_MOST 256

@@ -134,10 +134,8 @@ static bool is_excused(const ov_judge *judge, const double at[3], double distanc
 
 /* Whether a vertex is where surfaces count. */
 static bool is_judged(const ov_judge *judge, const double at[3], double distance) {
-    for (int k = 0; k < 3; ++k)
-        if ((at[k] < judge->low[k] || at[k] > judge->high[k]) && distance <= judge->stray)
-            return false;
-    return !is_excused(judge, at, distance);
+    return (ov_box_near(&judge->region, at, 0.0) || distance > judge->stray) &&
+           !is_excused(judge, at, distance);
 }
 
 bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, const bool *exposed,

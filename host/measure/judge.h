@@ -4,6 +4,7 @@
 #ifndef OV_JUDGE_H
 #define OV_JUDGE_H
 
+#include "base/box.h"
 #include "field/quadric.h"
 #include "measure/distance.h"
 #include "mesh/march.h"
@@ -37,7 +38,7 @@ typedef struct ov_seen {
     ov_spot_list spots; /* all of them */
     double *hidden;     /* owned: 3 * hidden_count, the vertices that are of no outer surface */
     size_t hidden_count, hidden_capacity;
-    double low[3], high[3]; /* of the mesh when all of it was judged */
+    ov_box box; /* of the mesh when all of it was judged */
 } ov_seen;
 
 /* The original's surface, meshed once: a light mesh without normals, whose triangles stay on the
@@ -60,12 +61,12 @@ typedef struct ov_judge {
     ov_marcher *near_marcher; /* of what is near changes */
     double slack;             /* set by the owner, see ov_judge_spots() */
     bool whole;               /* set by the owner: walls of cavities count as outer surfaces do */
-    bool in_region;         /* set by the owner: only the surfaces within this box count, and not */
-    double low[3], high[3]; /* their areas: beyond it they may be cut off, */
-    double stray;           /* unless they are farther off than that, angstrom */
-    ov_spot *excused;       /* owned; within `excused_reach` of these it does not count either, */
-    size_t excused_count;   /* unless it is more than `excused_times` as far off as they are */
-    double excused_reach;   /* angstrom */
+    bool in_region;       /* set by the owner: only the surfaces within this box count, and not */
+    ov_box region;        /* their areas: beyond it they may be cut off, */
+    double stray;         /* unless they are farther off than that, angstrom */
+    ov_spot *excused;     /* owned; within `excused_reach` of these it does not count either, */
+    size_t excused_count; /* unless it is more than `excused_times` as far off as they are */
+    double excused_reach; /* angstrom */
     double excused_times;
     const ov_spot *wanted; /* the owner's; so near to these it does in any case, in cavities too */
     size_t wanted_count;

@@ -69,15 +69,6 @@ static bool is_in(const ov_box *box, const double at[3]) {
     return ov_box_near(box, at, 0.0);
 }
 
-static ov_box larger(const ov_box *box, double by) {
-    ov_box made;
-    for (size_t k = 0; k < 3; ++k) {
-        made.low[k] = box->low[k] - by;
-        made.high[k] = box->high[k] + by;
-    }
-    return made;
-}
-
 static double room_of(const ov_judge *judge, double least) {
     return BEYOND * least + BEYOND_STEPS * judge->meshing.spacing;
 }
@@ -96,14 +87,13 @@ static double share_of(const nearby *n) {
     const ov_seen *const seen = &n->judge->seen;
     double sum = 0.0, whole = 1.0;
     for (size_t axis = 0; axis < 3; ++axis)
-        whole *= seen->high[axis] - seen->low[axis];
+        whole *= seen->box.high[axis] - seen->box.low[axis];
     for (size_t k = 0; k < n->boxes; ++k) {
-        const ov_box meshed = larger(&n->box[k], room_of(n->judge, n->least));
+        const ov_box all = ov_box_larger(&n->box[k], room_of(n->judge, n->least));
+        const ov_box meshed = ov_box_common(&all, &seen->box);
         double volume = 1.0;
         for (size_t axis = 0; axis < 3; ++axis)
-            volume *= fmax(fmin(meshed.high[axis], seen->high[axis]) -
-                               fmax(meshed.low[axis], seen->low[axis]),
-                           0.0);
+            volume *= fmax(meshed.high[axis] - meshed.low[axis], 0.0);
         sum += volume;
     }
     return sum / whole;
@@ -224,7 +214,7 @@ cleanup:
 /* mesh stays NULL where the model has no surface there. */
 static ovoid_status mesh_excerpt(const nearby *n, excerpt *e) {
     ov_judge *const judge = n->judge;
-    const ov_box room = larger(e->box, room_of(judge, n->least));
+    const ov_box room = ov_box_larger(e->box, room_of(judge, n->least));
     size_t some = 0;
     ov_body *bodies = NULL;
     ovoid_status status = OVOID_OK;
@@ -327,7 +317,7 @@ cleanup:
 /* *known is false where there is no surface to tell by. */
 static ovoid_status look_in_box(nearby *n, size_t k, bool *known) {
     ovoid_status status = OVOID_OK;
-    excerpt e = {.box = &n->box[k], .sure = larger(&n->box[k], BEYOND * n->least)};
+    excerpt e = {.box = &n->box[k], .sure = ov_box_larger(&n->box[k], BEYOND * n->least)};
     OV_TRY(mesh_excerpt(n, &e));
     *known = e.mesh;
     if (!e.mesh)
@@ -372,15 +362,15 @@ ovoid_status ov_judge_remember(ov_judge *judge, const ov_quadric *quadrics, size
     ov_seen *const seen = &judge->seen;
     seen->hidden_count = 0;
     for (size_t k = 0; k < 3; ++k) {
-        seen->low[k] = INFINITY;
-        seen->high[k] = -INFINITY;
+        seen->box.low[k] = INFINITY;
+        seen->box.high[k] = -INFINITY;
     }
     for (size_t v = 0; v < mesh->vertices; ++v) {
         double at[3];
         ov_mesh_at(mesh, v, at);
         for (size_t k = 0; k < 3; ++k) {
-            seen->low[k] = fmin(seen->low[k], at[k]);
-            seen->high[k] = fmax(seen->high[k], at[k]);
+            seen->box.low[k] = fmin(seen->box.low[k], at[k]);
+            seen->box.high[k] = fmax(seen->box.high[k], at[k]);
         }
         if (!ov_mesh_is_exposed(mesh, v))
             OV_TRY(add_hidden(judge->context, seen, at));

@@ -123,47 +123,6 @@ cleanup:
 
 /* ---- neighbours ------------------------------------------------------------------------------ */
 
-bool ov_boxes_near(const ov_box *a, const ov_box *b, double distance) {
-    for (size_t k = 0; k < 3; ++k)
-        if (a->low[k] - distance > b->high[k] || b->low[k] - distance > a->high[k])
-            return false;
-    return true;
-}
-
-bool ov_box_near(const ov_box *box, const double at[3], double distance) {
-    for (size_t k = 0; k < 3; ++k)
-        if (at[k] < box->low[k] - distance || at[k] > box->high[k] + distance)
-            return false;
-    return true;
-}
-
-double ov_box_distance(const ov_box *box, const double at[3]) {
-    double square = 0.0;
-    for (size_t k = 0; k < 3; ++k) {
-        const double off = fmax(fmax(box->low[k] - at[k], at[k] - box->high[k]), 0.0);
-        square += off * off;
-    }
-    return sqrt(square);
-}
-
-ov_box ov_box_move(const ov_box *box, const ov_rigid *rigid) {
-    double middle[3], half[3], moved[3];
-    ov_box made;
-    for (size_t k = 0; k < 3; ++k) {
-        middle[k] = 0.5 * box->low[k] + 0.5 * box->high[k];
-        half[k] = box->high[k] - middle[k];
-    }
-    ov_rigid_move(rigid, middle, moved);
-    for (size_t k = 0; k < 3; ++k) {
-        const double *const row = rigid->rotation + 3 * k;
-        const double reach =
-            fabs(row[0]) * half[0] + fabs(row[1]) * half[1] + fabs(row[2]) * half[2];
-        made.low[k] = moved[k] - reach;
-        made.high[k] = moved[k] + reach;
-    }
-    return made;
-}
-
 bool ov_part_image_near(const ov_partition *partition, size_t p, size_t q, size_t image) {
     const ov_box *const box = &partition->part[p].box, *const other = &partition->part[q].box;
     if (image == 0)

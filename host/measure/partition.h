@@ -7,23 +7,7 @@
 #define OV_PARTITION_H
 
 #include "base/base.h"
-#include "base/rigid.h"
-
-typedef struct ov_box {
-    double low[3], high[3]; /* angstrom */
-} ov_box;
-
-/* Whether two boxes are no further apart than that along each axis, angstrom. */
-bool ov_boxes_near(const ov_box *a, const ov_box *b, double distance);
-
-/* A box about the moved box. */
-ov_box ov_box_move(const ov_box *box, const ov_rigid *rigid);
-
-/* Whether a point is no further from the box than that along each axis. */
-bool ov_box_near(const ov_box *box, const double at[3], double distance);
-
-/* How far a point is from the box, angstrom. */
-double ov_box_distance(const ov_box *box, const double at[3]);
+#include "base/box.h"
 
 typedef struct ov_part {
     size_t first, count; /* of its atoms, in ov_partition.order */

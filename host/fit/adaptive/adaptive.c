@@ -158,8 +158,7 @@ static ovoid_status judge_region(ov_adaptive *f, ov_judge *judge) {
     judge->excused_times = judge->stray = INFINITY;
     judge->wanted = f->around.spots;
     judge->wanted_count = f->around.spot_count;
-    memcpy(judge->low, f->around.low, sizeof judge->low);
-    memcpy(judge->high, f->around.high, sizeof judge->high);
+    judge->region = f->around.region;
     if (wanted->goal == OVOID_GOAL_TOLERANCE)
         return excuse(f, take_standard(f), wanted->tolerance, judge);
     return wanted->effort > 0 ? excuse_by_number(f, judge) : OVOID_OK;

@@ -34,7 +34,7 @@ typedef struct ov_surroundings {
      * start, which points are refined against. */
     const ov_rigid *image;
     size_t images, lagging;
-    double low[3], high[3]; /* the box in which surfaces are held to one another, angstrom */
+    ov_box region; /* in which surfaces are held to one another */
     const ov_spot
         *spots;        /* where the start is off: it is mended there, cavities or not, and else */
     size_t spot_count; /* stays as it is; 0: an ordinary search */

@@ -96,7 +96,8 @@ size_t ov_adaptive_surround(ov_adaptive *f, size_t count) {
     for (size_t g = 0; g < f->around.images; ++g)
         for (size_t i = 0; i < count; ++i) {
             ov_quadric_move(&f->quadrics[i], &f->around.image[g], &f->quadrics[all]);
-            all += ov_quadric_meets(&f->quadrics[all], floor, f->around.low, f->around.high);
+            all += ov_quadric_meets(&f->quadrics[all], floor, f->around.region.low,
+                                    f->around.region.high);
         }
     return all;
 }

@@ -79,12 +79,9 @@ cleanup:
 
 /* Whether an ellipsoid is felt where the surface about a box is judged. */
 static bool reaches(const ov_parts *parts, const ov_quadric *quadric, const ov_box *box) {
-    double low[3], high[3];
-    for (size_t k = 0; k < 3; ++k) {
-        low[k] = box->low[k] - parts->margin;
-        high[k] = box->high[k] + parts->margin;
-    }
-    return ov_quadric_meets(quadric, ov_tuned.refine_cutoff * parts->options->isovalue, low, high);
+    const ov_box judged = ov_box_larger(box, parts->margin);
+    return ov_quadric_meets(quadric, ov_tuned.refine_cutoff * parts->options->isovalue, judged.low,
+                            judged.high);
 }
 
 /* An image's ellipsoids that stand for atoms about a box (taken), and those that are felt there;
@@ -251,15 +248,11 @@ ovoid_status ov_scene_of_cell(ovoid_context *context, const ov_parts *parts, siz
 
 ov_surroundings ov_scene_surround(const ov_parts *parts, const ov_scene *scene, size_t own,
                                   const ov_box *box, size_t done) {
-    ov_surroundings around = {.atoms = scene->atoms - own,
-                              .fixed = scene->model,
-                              .fixed_count = scene->model_count,
-                              .lagging = scene->lagging,
-                              .done = done,
-                              .total = parts->partition.count};
-    for (size_t k = 0; k < 3; ++k) {
-        around.low[k] = box->low[k] - parts->margin;
-        around.high[k] = box->high[k] + parts->margin;
-    }
-    return around;
+    return (ov_surroundings){.atoms = scene->atoms - own,
+                             .fixed = scene->model,
+                             .fixed_count = scene->model_count,
+                             .lagging = scene->lagging,
+                             .region = ov_box_larger(box, parts->margin),
+                             .done = done,
+                             .total = parts->partition.count};
 }

@@ -335,6 +335,40 @@ static void starts_from_anywhere(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* The molecule and a bead of its own beyond the end, where nothing of a model of it is felt. */
+static ovoid_molecule *with_bead(ovoid_context *context, const ovoid_molecule *molecule) {
+    const size_t atoms = ovoid_molecule_atoms(molecule);
+    double *const xyzr = test_alloc(4 * (atoms + 1), sizeof *xyzr);
+    memcpy(xyzr, ovoid_molecule_xyzr(molecule), 4 * atoms * sizeof *xyzr);
+    memcpy(xyzr + 4 * atoms, (const double[4]){0.0, 0.0, -14.0, 1.2}, 4 * sizeof *xyzr);
+    ovoid_molecule *const made = molecule_of(context, xyzr, atoms + 1);
+    free(xyzr);
+    return made;
+}
+
+/* What the ellipsoids of a start have left to itself comes back: the search need not begin anew. */
+static void what_is_missed_comes_back(void **state) {
+    ovoid_molecule *molecule = rod(*state, 60), *both = with_bead(*state, molecule);
+    ovoid_fitter *fitter = fitter_of(*state, molecule), *other = fitter_of(*state, both);
+    ovoid_fit_result first, result;
+    ovoid_model *start = reach(*state, fitter, OVOID_GOAL_TOLERANCE, 0.6 * TOLERANCE, &first);
+    test_check(*state, ovoid_fitter_start_from(*state, other, start));
+    count_calls(both);
+    ovoid_model *model = reach(*state, other, OVOID_GOAL_TOLERANCE, TOLERANCE, &result);
+    assert_int_equal(calls.reductions, 0);
+    assert_true(result.reached);
+    expect_holds(*state, both, model, TOLERANCE);
+    print_message("%llu ellipsoids, %llu with a bead\n", (unsigned long long)first.ellipsoids,
+                  (unsigned long long)result.ellipsoids);
+    assert_true(result.ellipsoids <= first.ellipsoids + 1);
+    ovoid_model_destroy(&start);
+    ovoid_model_destroy(&model);
+    ovoid_fitter_destroy(&fitter);
+    ovoid_fitter_destroy(&other);
+    ovoid_molecule_destroy(&molecule);
+    ovoid_molecule_destroy(&both);
+}
+
 /* ---- other coordinates ------------------------------------------------------------------------
  */
 
@@ -687,6 +721,7 @@ int main(void) {
         cmocka_unit_test(tighter_and_looser),
         cmocka_unit_test(to_other_numbers),
         cmocka_unit_test(starts_from_anywhere),
+        cmocka_unit_test(what_is_missed_comes_back),
         cmocka_unit_test(frames),
         cmocka_unit_test(motions),
         cmocka_unit_test(ellipsoids_go_with_their_atoms),

@@ -6,6 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* In this round, as a place's number of earlier meetings. */
+#define DEALT_WITH UINT32_MAX
+
 /* What growing works with. */
 typedef struct growth {
     ov_places places;
@@ -96,6 +99,39 @@ static ovoid_status choose(ov_adaptive *f, const ov_trial *t, const ov_spots *sp
     return status;
 }
 
+/* Chooses in addition the ellipsoids that stand for the atoms that matter at a place, wherever
+ * these ellipsoids are. */
+static void choose_owners(const ov_adaptive *f, const ov_trial *t, const double at[3], growth *g) {
+    const double log_least = log(ov_tuned.grow_matters * f->options->isovalue);
+    for (size_t i = 0; i < f->atoms; ++i) {
+        ov_quadric atom;
+        ov_quadric_of_atom(f->xyzr + 4 * i, f->options->decay, &atom);
+        if (ov_quadric_log_value(&atom, at) >= log_least)
+            g->chosen[t->owner[i]] = true;
+    }
+}
+
+/* Where no ellipsoid matters, those that stand for the atoms there have strayed, and nothing that
+ * is done to what is felt there would help: they are split, by their atoms. */
+static ovoid_status call_back(ov_adaptive *f, ov_trial *t, const ov_spots *spots, growth *g) {
+    ovoid_status status = OVOID_OK;
+    ov_reach reach = {0};
+    memset(g->chosen, 0, t->count * sizeof *g->chosen);
+    OV_TRY(ov_reach_create(f->context, t->x, t->count,
+                           log(ov_tuned.grow_matters * f->options->isovalue), &reach));
+    for (size_t n = 0; n < spots->count; ++n) {
+        const double *const at = spots->spot[n].at;
+        if (g->before[n] < g->patience || ov_reach_at(&reach, at, g->felt) > 0)
+            continue;
+        choose_owners(f, t, at, g);
+        g->before[n] = DEALT_WITH;
+    }
+    OV_TRY(ov_adaptive_rebuild(f, t, 2.0, g->chosen));
+cleanup:
+    ov_reach_destroy(&reach);
+    return status;
+}
+
 /* Goes back to the atoms at the places that do not give way. */
 static ovoid_status rebuild(ov_adaptive *f, ov_trial *t, const ov_spots *spots, growth *g) {
     ovoid_status status = OVOID_OK;
@@ -124,6 +160,7 @@ static ovoid_status act(ov_adaptive *f, const char *stage, ov_trial *t, const ov
     OV_TRY(ov_adaptive_emphasise(f, spots, ov_tuned.spots_emphasis_reach, ov_tuned.spots_emphasis));
     OV_TRY(ov_places_meet(f->context, &g->places, spots, ov_tuned.spots_apart, g->before));
     OV_TRY(rebuild(f, t, spots, g));
+    OV_TRY(call_back(f, t, spots, g));
     OV_TRY(split(f, t, spots, g));
     OV_TRY(choose(f, t, spots, 0, UINT32_MAX, ov_tuned.grow_refined, g));
     OV_TRY(ov_adaptive_refine_some(f, t, stage, ov_tuned.refine_local_steps, g->chosen));

@@ -198,8 +198,9 @@ static void a_filled_cavity(void **state) {
     test_check(*state,
                ov_judge_spots(&judge, quadrics, SHELL + 1, 0.5, 1.0, 9, &again, &spots, &count));
     assert_true(count > 0);
-    expect_near(spots[0].distance, got.hausdorff, 1e-6, "furthest spot");
-    expect_near(again.deviation, got.hausdorff, 1e-6, "deviation of the whole");
+    /* spots are looked for on rougher meshes */
+    expect_near(spots[0].distance, got.hausdorff, 1e-4, "furthest spot");
+    expect_near(again.deviation, got.hausdorff, 1e-4, "deviation of the whole");
     free(spots);
     free(quadrics);
     ov_judge_destroy(&judge);

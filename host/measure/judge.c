@@ -17,6 +17,11 @@
 #define ENOUGH 0.8
 #define ENOUGH_INSIDE 0.7
 
+/* Terms that are left out where spots are looked for: below this share of the isovalue for each
+ * 1 / sqrt(2 d) that spots are off, and none above the other. */
+#define ROUGH_SLOPE 2e-4
+#define ROUGH_MOST 1e-4
+
 /* The light mesh of some bodies, with normals where its area and its volume are wanted; its
  * components are still to be found. *mesh is NULL where there is no surface. */
 static ovoid_status mesh_bodies(const ov_judge *judge, const ov_body *bodies, size_t count,
@@ -295,6 +300,10 @@ cleanup:
     return status;
 }
 
+double ov_judge_cutoff(const ov_judge *judge, double least) {
+    return fmax(fmin(ROUGH_SLOPE * least * judge->root_2d, ROUGH_MOST), OV_MARCH_CUTOFF);
+}
+
 double ov_judge_enough(const ov_judge *judge, double least) {
     const double reach = judge->slack > 0.0 ? ENOUGH_INSIDE * judge->meshing.spacing : 0.0;
     return fmax(fmin(ENOUGH * least, least - reach), 0.0);
@@ -324,6 +333,7 @@ static ovoid_status look_everywhere(ov_judge *judge, const ov_quadric *quadrics,
     ovoid_status status = OVOID_OK;
     trial t = {0};
     judge->seen.known = false;
+    ov_marcher_cut_off(judge->marcher, ov_judge_cutoff(judge, least));
     OV_TRY(try_model(judge, quadrics, count, ov_judge_enough(judge, least), &t, NULL, judgement));
     if (!judgement->valid)
         goto cleanup;
@@ -403,6 +413,7 @@ ovoid_status ov_judge_model(ov_judge *judge, const ov_quadric *quadrics, size_t 
     ovoid_status status = OVOID_OK;
     trial t = {0};
     ov_content content;
+    ov_marcher_cut_off(judge->marcher, OV_MARCH_CUTOFF);
     OV_TRY(try_model(judge, quadrics, count, 0.0, &t, &content, judgement));
     if (!judgement->valid)
         goto cleanup;
@@ -423,6 +434,7 @@ ovoid_status ov_judge_volume(ov_judge *judge, const ov_quadric *quadrics, size_t
     *ratio = 1.0;
     if (!judge->mesh)
         return OVOID_OK;
+    ov_marcher_cut_off(judge->marcher, OV_MARCH_CUTOFF);
     ovoid_status status = mesh_model(judge, quadrics, count, true, &mesh);
     if (mesh)
         status = finish_mesh(judge, mesh, &content);

@@ -218,15 +218,17 @@ static ovoid_status mesh_excerpt(const nearby *n, excerpt *e) {
     size_t some = 0;
     ov_body *bodies = NULL;
     ovoid_status status = OVOID_OK;
+    const double cutoff = ov_judge_cutoff(judge, n->least);
     ov_quadric *const chosen = ov_alloc(judge->context, n->count, sizeof *chosen, "ellipsoids");
     if (!chosen)
         return OVOID_ERROR_MEMORY;
     for (size_t i = 0; i < n->count; ++i)
-        if (ov_quadric_meets(&n->quadrics[i], OV_MARCH_CUTOFF * judge->meshing.isovalue, room.low,
+        if (ov_quadric_meets(&n->quadrics[i], cutoff * judge->meshing.isovalue, room.low,
                              room.high))
             chosen[some++] = n->quadrics[i];
     OV_TRY(ov_bodies_of_quadrics(judge->context, chosen, some, &bodies));
     ov_marcher_clip(judge->near_marcher, room.low, room.high);
+    ov_marcher_cut_off(judge->near_marcher, cutoff);
     OV_TRY(ov_mesh_bodies_light(judge->context, judge->near_marcher, bodies, some, &judge->meshing,
                                 judge->origin, &judge->watch, false, &e->mesh));
     OV_TRY(ov_mesh_finish(judge->context, e->mesh));

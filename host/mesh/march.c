@@ -35,6 +35,7 @@ typedef struct ov_marcher {
     const ovoid_mesh_options *options;
     const double *origin; /* of the offsets of a light mesh, else NULL */
     bool bare;            /* a light mesh without normals is wanted */
+    double cutoff;        /* terms count where they are at least this */
     bool resident;        /* the light mesh so far is on the device, too */
     const ov_watch *watch;
     ov_pieces pieces;
@@ -57,6 +58,7 @@ typedef struct ov_marcher {
     ov_brick_grid grid;
     double clip[2][3];   /* the box that they end at, angstrom, */
     bool clipped;        /* if there is one */
+    double share;        /* of the isovalue, from which on terms count; 0: OV_MARCH_CUTOFF */
     uint64_t wanted[3];  /* points of pieces, so that the grid stays; 0: nothing is wanted */
     double grid_spacing; /* angstrom */
     bool ghosts_empty;   /* on the device */
@@ -331,8 +333,7 @@ static ovoid_status set_terms(ovoid_context *context, marcher *m, size_t piece) 
                    "terms of a lattice piece"));
     for (size_t k = 0; k < count; ++k)
         m->quadrics[k] = m->bodies[m->pieces.term[first + k]].quadric;
-    OV_TRY(ov_terms_set(context, &m->terms, m->quadrics, count, m->corner,
-                        OV_MARCH_CUTOFF * m->options->isovalue));
+    OV_TRY(ov_terms_set(context, &m->terms, m->quadrics, count, m->corner, m->cutoff));
 cleanup:
     return status;
 }
@@ -788,8 +789,7 @@ static ovoid_status add_specks(ovoid_context *context, marcher *m, size_t count)
                                .triangles = m->triangles};
     OV_TRY(ov_store_alloc(context, m->store, &lattice.replaced, m->vertices,
                           sizeof *lattice.replaced, "vertices"));
-    OV_TRY(ov_specks_find(context, m->bodies, count, m->options,
-                          OV_MARCH_CUTOFF * m->options->isovalue, &lattice, &specks));
+    OV_TRY(ov_specks_find(context, m->bodies, count, m->options, m->cutoff, &lattice, &specks));
     m->missed = specks.missed;
     if (specks.vertices == 0)
         goto cleanup;
@@ -960,9 +960,8 @@ static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
     ovoid_status status = OVOID_OK;
     bool sparse;
     const ovoid_mesh_options *const o = m->options;
-    const double cutoff = OV_MARCH_CUTOFF * o->isovalue;
     ov_pieces *const best = &m->pieces;
-    OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing, limit,
+    OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, m->cutoff, o->spacing, limit,
                             m->wanted, m->clipped ? m->clip : NULL, best));
     sparse = (double)best->count[0] * (double)best->count[1] * (double)best->count[2] >
              EMPTY_SHARE * (double)best->pieces;
@@ -970,7 +969,7 @@ static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
         ov_pieces other;
         if (k == 0 ? points_of(best) <= EMPTY_POINTS : !sparse)
             continue;
-        OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, cutoff, o->spacing,
+        OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, m->cutoff, o->spacing,
                                 sparse_limits[k], m->wanted, m->clipped ? m->clip : NULL, &other));
         if (cost_of(&other) < cost_of(best)) {
             const ov_pieces swap = *best;
@@ -1020,6 +1019,7 @@ static ovoid_status march(ovoid_context *context, marcher *kept, const ov_body *
     m->origin = how->origin;
     m->watch = how->watch;
     m->bare = how->bare;
+    m->cutoff = (m->share > 0.0 ? m->share : OV_MARCH_CUTOFF) * options->isovalue;
     m->resident = kept && how->origin;
     ovoid_status status = march_with(context, m, count, how);
     if (!kept)
@@ -1099,6 +1099,10 @@ void ov_marcher_clip(ov_marcher *m, const double low[3], const double high[3]) {
     memcpy(m->clip[0], low, sizeof m->clip[0]);
     memcpy(m->clip[1], high, sizeof m->clip[1]);
     m->clipped = true;
+}
+
+void ov_marcher_cut_off(ov_marcher *m, double share) {
+    m->share = share;
 }
 
 void ov_marcher_begin(ov_marcher *m) {

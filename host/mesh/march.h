@@ -17,7 +17,8 @@
 /* A vertex keeps this far from the ends of its edge, in lattice steps (see kernels/march.cl). */
 #define OV_EDGE_MARGIN 7.62939453125e-6
 
-/* Terms count where they are at least this share of the isovalue. */
+/* Terms count where they are at least this share of the isovalue, unless a marcher is told another.
+ */
 #define OV_MARCH_CUTOFF 1e-7
 
 /* The mesh of phi = isovalue. Vertices are numbered piece by piece from the highest piece down, in
@@ -50,6 +51,9 @@ void ov_marcher_begin(ov_marcher *marcher);
 /* The next meshes end at this box, which may be endless: only what lies in it, less a few steps of
  * the lattice, is what the whole mesh would have there. */
 void ov_marcher_clip(ov_marcher *marcher, const double low[3], const double high[3]);
+
+/* Terms count in the next meshes where they are at least this share of the isovalue. */
+void ov_marcher_cut_off(ov_marcher *marcher, double share);
 
 /* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The full one is kept in
  * the store, which may be NULL, and shares it. The light one knows its components only after

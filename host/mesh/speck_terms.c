@@ -102,6 +102,17 @@ cleanup:
 /* Called with the position in the grid of a candidate that may lie in the box. */
 typedef void visit_fn(size_t position, void *user);
 
+/* As ov_first_key(), known to be no candidate before `from`, and mostly near it. */
+static size_t first_from(const grid *g, size_t from, uint64_t key) {
+    size_t step = 1;
+    while (from + step < g->count && g->key[from + step] < key) {
+        from += step;
+        step *= 2;
+    }
+    const size_t left = g->count - from;
+    return from + ov_first_key(g->key + from, left < step + 1 ? left : step + 1, key);
+}
+
 /* Visits all candidates in the cells that the box about `centre` touches. */
 static void visit_box(const grid *g, const double centre[3], const double half[3], visit_fn *visit,
                       void *user) {
@@ -115,11 +126,12 @@ static void visit_box(const grid *g, const double centre[3], const double half[3
             visit(k, user);
         return;
     }
+    size_t k = ov_first_key(g->key, g->count, key_of(from[0], from[1], from[2]));
     for (uint64_t z = from[2]; z <= to[2]; ++z)
         for (uint64_t y = from[1]; y <= to[1]; ++y) {
             const uint64_t last = key_of(to[0], y, z);
-            for (size_t k = ov_first_key(g->key, g->count, key_of(from[0], y, z));
-                 k < g->count && g->key[k] <= last; ++k)
+            for (k = first_from(g, k, key_of(from[0], y, z)); k < g->count && g->key[k] <= last;
+                 ++k)
                 visit(k, user);
         }
 }

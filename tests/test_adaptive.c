@@ -596,6 +596,56 @@ static void without_effort_it_ends_sooner(void **state) {
     ovoid_molecule_destroy(&molecule);
 }
 
+/* What a search came to as it went on. */
+typedef struct course {
+    const char *stage;         /* the last one */
+    uint64_t confirmed;        /* ellipsoids at the end of confirming */
+    unsigned after_confirming; /* how often shrinking followed that */
+} course;
+
+static bool follow(const ovoid_progress *progress, void *user) {
+    course *const c = user;
+    if (strcmp(progress->stage, "confirm") == 0)
+        c->confirmed = progress->ellipsoids;
+    else if (strcmp(progress->stage, "shrink") == 0)
+        c->after_confirming += c->stage && strcmp(c->stage, "confirm") == 0;
+    c->stage = progress->stage;
+    return true;
+}
+
+static course course_of(ovoid_context *context, const ovoid_molecule *molecule, uint32_t effort,
+                        uint64_t *ellipsoids) {
+    course c = {0};
+    ovoid_fit_options options = quick_options_of(OVOID_GOAL_TOLERANCE, 0.5);
+    options.adaptive.effort = effort;
+    ovoid_context_on_progress(context, follow, &c);
+    outcome o = fit(context, molecule, &options);
+    ovoid_context_on_progress(context, NULL, NULL);
+    assert_true(o.result.reached);
+    *ellipsoids = o.result.ellipsoids;
+    ovoid_model_destroy(&o.model);
+    return c;
+}
+
+/* With effort 2 ellipsoids that a closer look asked for are merged again as far as they can be. */
+static void what_confirming_adds_is_merged_again(void **state) {
+    test_skip_simulated(*state);
+    if (test_small()) /* nothing is added */
+        skip();
+    uint64_t saved = 0, ellipsoids;
+    for (uint64_t seed = 4; seed < 7; ++seed) {
+        ovoid_molecule *molecule = random_ball(*state, 100, 7.0, 1.5, seed);
+        assert_int_equal(course_of(*state, molecule, 1, &ellipsoids).after_confirming, 0);
+        const course c = course_of(*state, molecule, 2, &ellipsoids);
+        print_message("%d confirmed, %d left\n", (int)c.confirmed, (int)ellipsoids);
+        assert_int_equal(c.after_confirming, 1);
+        assert_true(ellipsoids <= c.confirmed);
+        saved += c.confirmed - ellipsoids;
+        ovoid_molecule_destroy(&molecule);
+    }
+    assert_true(saved > 0);
+}
+
 /* With effort 0 nothing is done about what is furthest off. */
 static void the_furthest_comes_nearer(void **state) {
     test_skip_simulated(*state);
@@ -810,6 +860,7 @@ int main(void) {
         cmocka_unit_test(a_rod_equals_its_integral),
         cmocka_unit_test(merges_get_their_chances),
         cmocka_unit_test(effort_helps),
+        cmocka_unit_test(what_confirming_adds_is_merged_again),
         cmocka_unit_test(without_effort_it_ends_sooner),
         cmocka_unit_test(the_furthest_comes_nearer),
         cmocka_unit_test(two_fits_give_the_same_bits),

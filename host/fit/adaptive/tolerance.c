@@ -208,6 +208,21 @@ cleanup:
     return status;
 }
 
+/* With effort, what confirming added is merged again where it can be, judged as closely: that takes
+ * as long as all that was done before. */
+static ovoid_status confirm_and_shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
+    ovoid_status status = OVOID_OK;
+    const size_t before = best->count;
+    OV_TRY(confirm(f, tolerance, best));
+    if (best->count <= before)
+        goto cleanup;
+    f->fewest += best->count - before;
+    if (f->options->adaptive.effort > 1 && ov_trial_holds(best, tolerance))
+        OV_TRY(shrink(f, tolerance, best));
+cleanup:
+    return status;
+}
+
 /* Shrinks what holds by the spacing, and confirms what that comes to. A start is confirmed before,
  * and is what is left where that takes no more ellipsoids: what merges saved by the spacing may
  * have to be added again by the finer one. */
@@ -223,11 +238,8 @@ static ovoid_status shrink_and_confirm(ov_adaptive *f, double tolerance, ov_tria
         ov_trial_copy(best, &kept);
     }
     OV_TRY(shrink(f, tolerance, best));
-    if (!keeps || best->count < kept.count) {
-        const size_t before = best->count;
-        OV_TRY(confirm(f, tolerance, best));
-        f->fewest += best->count > before ? best->count - before : 0;
-    }
+    if (!keeps || best->count < kept.count)
+        OV_TRY(confirm_and_shrink(f, tolerance, best));
     if (keeps && (best->count >= kept.count || !ov_trial_holds(best, tolerance)))
         ov_trial_swap(&kept, best);
     ov_adaptive_look_closely(f, true);

@@ -48,7 +48,7 @@ host/fit/adaptive/local.c|local|points are not found anew|s/m->escaped =$/m->esc
 host/fit/adaptive/merge.c|merge|a split forgets the variance|s/half.decay\[2\] \/= shrink;//
 host/fit/adaptive/grow.c|fitter|ellipsoids that strayed are left alone|s/g->before\[n\] < g->patience || ov_reach_at/true || ov_reach_at/
 host/fit/adaptive/tolerance.c|+adaptive|what confirming added stays|s/effort > 1 \&\& ov_trial_holds/effort > 99 \&\& ov_trial_holds/
-host/mesh/speck_terms.c|speck_terms|small terms are missed between rows|s/^        from += step;/        from += step + 1;/
+host/mesh/speck_terms.c|speck_terms|small terms are missed between rows|s/^        from += step;/        from += 2 * step;/
 host/measure/spots.c|judge|spots are not thinned|s/if (square < apart \* apart)/if (false)/
 host/measure/near.c|near|no piece that leaves the box is hidden|s/seen->hidden_count == 0 || ov_grid_near/true || ov_grid_near/
 host/measure/near.c|near|the end of a mesh joins what it cuts|s/find_pieces(e->mesh, &e->sure, piece)/find_pieces(e->mesh, \&(ov_box){{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}}, piece)/

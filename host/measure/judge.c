@@ -18,9 +18,11 @@
 #define ENOUGH_INSIDE 0.7
 
 /* Terms that are left out where spots are looked for: below this share of the isovalue for each
- * 1 / sqrt(2 d) that spots are off, and none above the other. */
+ * 1 / sqrt(2 d) that spots are off, and none above the other. Where it is done closely, with some
+ * slack, so much less; without any slack, as in other meshes. */
 #define ROUGH_SLOPE 2e-4
 #define ROUGH_MOST 1e-4
+#define CLOSELY 0.1
 
 /* The light mesh of some bodies, with normals where its area and its volume are wanted; its
  * components are still to be found. *mesh is NULL where there is no surface. */
@@ -301,7 +303,9 @@ cleanup:
 }
 
 double ov_judge_cutoff(const ov_judge *judge, double least) {
-    return fmax(fmin(ROUGH_SLOPE * least * judge->root_2d, ROUGH_MOST), OV_MARCH_CUTOFF);
+    const double rough = fmin(ROUGH_SLOPE * least * judge->root_2d, ROUGH_MOST);
+    const double share = !judge->closely ? 1.0 : judge->slack > 0.0 ? CLOSELY : 0.0;
+    return fmax(share * rough, OV_MARCH_CUTOFF);
 }
 
 double ov_judge_enough(const ov_judge *judge, double least) {

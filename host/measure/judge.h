@@ -32,7 +32,7 @@ typedef struct ov_spot_list {
 typedef struct ov_seen {
     bool known;
     double least, slack; /* which spots */
-    bool whole;
+    bool closely, whole;
     ov_quadric *quadric; /* the model: owned, `count` of them */
     size_t count, capacity;
     ov_spot_list spots; /* all of them */
@@ -60,6 +60,7 @@ typedef struct ov_judge {
     ov_seen seen;
     ov_marcher *near_marcher; /* of what is near changes */
     double slack;             /* set by the owner, see ov_judge_spots() */
+    bool closely;             /* set by the owner: spots are looked for on meshes as good as any */
     bool whole;               /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;       /* set by the owner: only the surfaces within this box count, and not */
     ov_box region;        /* their areas: beyond it they may be cut off, */

@@ -16,7 +16,8 @@ bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, const bool *
 double ov_judge_enough(const ov_judge *judge, double least);
 
 /* From which share of the isovalue on terms count where spots are looked for that are `least` off:
- * what all others together move a vertex by is 0.4 % of that at most, and mostly a tenth of it. */
+ * what all others together move a vertex by is 0.4 % of that at most, and mostly a tenth of it;
+ * where they are looked for closely, a tenth of that, or nothing. */
 double ov_judge_cutoff(const ov_judge *judge, double least);
 
 /* Adds a spot to the list `spots` of a judge. */

@@ -351,6 +351,7 @@ static ovoid_status remember_model(ov_judge *judge, const ov_quadric *quadrics, 
     seen->spots.count = spot_count;
     seen->least = least;
     seen->slack = judge->slack;
+    seen->closely = judge->closely;
     seen->whole = judge->whole;
     seen->known = true;
 cleanup:
@@ -395,7 +396,7 @@ void ov_seen_destroy(ov_seen *seen) {
 static bool is_the_same(const ov_judge *judge, double least) {
     const ov_seen *const seen = &judge->seen;
     return seen->known && seen->least == least && seen->slack == judge->slack &&
-           seen->whole == judge->whole;
+           seen->closely == judge->closely && seen->whole == judge->whole;
 }
 
 ovoid_status ov_judge_near(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,

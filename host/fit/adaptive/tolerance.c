@@ -262,6 +262,7 @@ void ov_adaptive_look_closely(ov_adaptive *f, bool closely) {
     const bool inside = closely && margin(f) > 0.0;
     f->judge.slack = f->fine.slack =
         inside ? ov_tuned.tolerance_slack * f->options->adaptive.tolerance : 0.0;
+    f->judge.closely = f->fine.closely = closely;
     f->finely = closely && f->fine.mesh;
 }
 
@@ -295,6 +296,7 @@ ovoid_status ov_adaptive_mend(ov_adaptive *f, double tolerance, ov_trial *best) 
     ovoid_status status = OVOID_OK;
     ov_spots spots = {0};
     const ov_growing how = {.stage = "mend", .most = f->atoms, .rounds = ov_tuned.grow_rounds};
+    ov_adaptive_look_closely(f, true);
     OV_TRY(ov_adaptive_take_start(f, best));
     OV_TRY(ov_adaptive_spots(f, best, tolerance, f->capacity, &spots));
     if (f->options->adaptive.steps > 0)

@@ -170,11 +170,24 @@ static void gaps_close(void **state) {
     ov_trial_destroy(&l.trial);
 }
 
+/* Ellipsoids without atoms may take up what room there is for more than the atoms. */
+static void no_more_than_there_is_room_for(void **state) {
+    line l;
+    const bool chosen[BEFORE] = {false, true, false, false, false, false};
+    line_create(*state, &l);
+    l.fit.capacity = BEFORE + 1;
+    test_check(*state, ov_adaptive_rebuild(&l.fit, &l.trial, 1e9, chosen));
+    assert_int_equal(l.trial.count, BEFORE + 1);
+    for (size_t i = 4; i < 8; ++i)
+        assert_true(l.trial.owner[i] == 1 || l.trial.owner[i] == BEFORE);
+    ov_trial_destroy(&l.trial);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(places_are_met_again), cmocka_unit_test(near_means_within_reach),
         cmocka_unit_test(atoms_come_back),      cmocka_unit_test(regions_are_merged_anew),
-        cmocka_unit_test(gaps_close),
+        cmocka_unit_test(gaps_close),           cmocka_unit_test(no_more_than_there_is_room_for),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

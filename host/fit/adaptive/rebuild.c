@@ -58,7 +58,8 @@ ovoid_status ov_adaptive_rebuild(ov_adaptive *f, ov_trial *t, double factor, con
         old += chosen[i];
     if (atoms == 0)
         goto cleanup;
-    const size_t count = (size_t)fmin(fmax(ceil(factor * (double)old), 1.0), (double)atoms);
+    const size_t room = f->capacity - (before - old), most = atoms < room ? atoms : room;
+    const size_t count = (size_t)fmin(fmax(ceil(factor * (double)old), 1.0), (double)most);
     const ov_reduction_options merging = ov_adaptive_merging();
     OV_TRY(ov_reduction_create(f->context, quadrics, atoms, count, &merging, &reduction));
     OV_TRY(ov_reduction_cut(f->context, reduction, count, quadrics, owner));

@@ -129,8 +129,8 @@ ovoid_status ov_adaptive_cut(ov_adaptive *f, size_t kind, size_t count, ov_trial
 /* How atoms merge at the first start. */
 ov_reduction_options ov_adaptive_merging(void);
 /* Goes back to the atoms of the chosen ellipsoids and merges these anew to `factor` times as many
- * ellipsoids, the atoms themselves at most, in place of the chosen; all stays as it is where the
- * chosen have no atoms. */
+ * ellipsoids, the atoms themselves at most and as many as there is room for, in place of the
+ * chosen; all stays as it is where the chosen have no atoms. */
 ovoid_status ov_adaptive_rebuild(ov_adaptive *f, ov_trial *t, double factor, const bool *chosen);
 void ov_adaptive_drop_reductions(ov_adaptive *f);
 /* Asks for phi under one window: the target as it was before any search. */

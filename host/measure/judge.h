@@ -60,7 +60,7 @@ typedef struct ov_judge {
     ov_seen seen;
     ov_marcher *near_marcher; /* of what is near changes */
     double slack;             /* set by the owner, see ov_judge_spots() */
-    bool closely;             /* set by the owner: spots are looked for on meshes as good as any */
+    bool closely;             /* set by the owner: less is left out where spots are looked for */
     bool whole;               /* set by the owner: walls of cavities count as outer surfaces do */
     bool in_region;       /* set by the owner: only the surfaces within this box count, and not */
     ov_box region;        /* their areas: beyond it they may be cut off, */

@@ -208,8 +208,8 @@ cleanup:
     return status;
 }
 
-/* With effort, what confirming added is merged again where it can be, judged as closely: that takes
- * as long as all that was done before. */
+/* With an effort above 1, what confirming added is merged again where it can be, judged as closely:
+ * that takes about as long as all that was done before. */
 static ovoid_status confirm_and_shrink(ov_adaptive *f, double tolerance, ov_trial *best) {
     ovoid_status status = OVOID_OK;
     const size_t before = best->count;
@@ -296,7 +296,7 @@ ovoid_status ov_adaptive_mend(ov_adaptive *f, double tolerance, ov_trial *best) 
     ovoid_status status = OVOID_OK;
     ov_spots spots = {0};
     const ov_growing how = {.stage = "mend", .most = f->atoms, .rounds = ov_tuned.grow_rounds};
-    ov_adaptive_look_closely(f, true);
+    ov_adaptive_look_closely(f, true); /* what is mended here is surveyed next */
     OV_TRY(ov_adaptive_take_start(f, best));
     OV_TRY(ov_adaptive_spots(f, best, tolerance, f->capacity, &spots));
     if (f->options->adaptive.steps > 0)

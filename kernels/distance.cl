@@ -7,59 +7,11 @@
  * distance does not depend on the order in which it is found.
  *
  * triangles: per leaf OV_TRIANGLE arrays of OV_LEAF floats: corner p (3), edges u and v from it (3
- * each), the vectors g and h (3 each) with u.g = v.h = 1, u.h = v.g = 0 in the triangle's plane,
- * and 1/u^2, 1/v^2, 1/(v-u)^2. What a degenerate triangle does not have is zero. The last leaf is
- * filled up with its last triangle.
+ * each). The last leaf is filled up with its last triangle. What else a point needs of a triangle
+ * is worked out each time: reading it would take longer.
  */
 
 /* ---- making leaves ------------------------------------------------------------------------ */
-
-/* a b - c d, as near as a float comes (Kahan): of needles' normals, the rest is all rounding. */
-static inline float ov_minor(float a, float b, float c, float d) {
-    const float cd = c * d;
-    return fma(a, b, -cd) + fma(-c, d, cd);
-}
-
-static inline void ov_cross(const float *a, const float *b, float *result) {
-    result[0] = ov_minor(a[1], b[2], a[2], b[1]);
-    result[1] = ov_minor(a[2], b[0], a[0], b[2]);
-    result[2] = ov_minor(a[0], b[1], a[1], b[0]);
-}
-
-static inline float ov_square(const float *a) {
-    return fma(a[0], a[0], fma(a[1], a[1], a[2] * a[2]));
-}
-
-static inline float ov_inverse(float square) {
-    return square > 0.0f ? min(1.0f / square, FLT_MAX) : 0.0f;
-}
-
-/* A triangle whose height is below this share of its sides is flat: its edges are all of it. */
-#define FLAT 1e-12f /* squared */
-
-/* Edges and their duals are those of the corners rounded to floats, so that what a point is held
- * against is what the mesh's own points are. to: of a leaf, from the triangle's place on. */
-static inline void ov_put_triangle(const float *p, const float *u, const float *v,
-                                   __global float *to) {
-    float normal[3], g[3], h[3], across[3];
-    for (uint k = 0; k < 3; ++k)
-        across[k] = v[k] - u[k];
-    ov_cross(u, v, normal);
-    ov_cross(v, normal, g);
-    ov_cross(normal, u, h);
-    const float uu = ov_square(u), vv = ov_square(v), determinant = ov_square(normal);
-    const int flat = !(determinant > FLAT * uu * vv);
-    for (uint k = 0; k < 3; ++k) {
-        to[k * OV_LEAF] = p[k];
-        to[(3 + k) * OV_LEAF] = u[k];
-        to[(6 + k) * OV_LEAF] = v[k];
-        to[(9 + k) * OV_LEAF] = flat ? 0.0f : g[k] / determinant;
-        to[(12 + k) * OV_LEAF] = flat ? 0.0f : h[k] / determinant;
-    }
-    to[15 * OV_LEAF] = ov_inverse(uu);
-    to[16 * OV_LEAF] = ov_inverse(vv);
-    to[17 * OV_LEAF] = ov_inverse(ov_square(across));
-}
 
 /* The leaves of `triangles` triangles, three corners each, from number `first` on, each `stride`-th
  * of them, and the box about each leaf: low x, y, z, high x, y, z. xyz: of the vertices. */
@@ -74,17 +26,16 @@ __kernel void pack_leaves(const uint leaves, const uint triangles, const uint fi
     for (uint j = 0; j < OV_LEAF; ++j) {
         __global const uint *const corner =
             corners + 3 * (first + stride * (size_t)min(leaf * OV_LEAF + j, triangles - 1));
-        float p[3], u[3], v[3];
+        __global float *const to = packed + (size_t)leaf * (OV_TRIANGLE * OV_LEAF) + j;
         for (uint k = 0; k < 3; ++k) {
             const float a = xyz[3 * (size_t)corner[0] + k], b = xyz[3 * (size_t)corner[1] + k],
                         c = xyz[3 * (size_t)corner[2] + k];
-            p[k] = a;
-            u[k] = b - a;
-            v[k] = c - a;
+            to[k * OV_LEAF] = a;
+            to[(3 + k) * OV_LEAF] = b - a;
+            to[(6 + k) * OV_LEAF] = c - a;
             low[k] = min(low[k], min(a, min(b, c)));
             high[k] = max(high[k], max(a, max(b, c)));
         }
-        ov_put_triangle(p, u, v, packed + (size_t)leaf * (OV_TRIANGLE * OV_LEAF) + j);
     }
     for (uint k = 0; k < 3; ++k) {
         boxes[6 * (size_t)leaf + k] = low[k];
@@ -148,13 +99,18 @@ static inline ov_from ov_from_load(__global const float *points, const uint coun
     return from;
 }
 
+/* Finite in any case: a degenerate triangle's squares are nothing, or less after rounding. */
+static inline ov_wide ov_inverse(ov_wide square) {
+    return 1.0f / max(square, (ov_wide)FLT_MIN);
+}
+
 /* Squared distances from a point to some triangles of a leaf, the k-th vector of them: of the
  * nearest point of each triangle's plane, moved into the triangle, and of the nearest points of its
  * three edges. Each of the four lies in the triangle, and one of them is its nearest point, so that
  * rounding never finds anything nearer than there is. */
 static inline ov_wide ov_triangle_distances(float px, float py, float pz,
                                             __global const float *leaf, uint k) {
-    ov_wide w[3], u[3], v[3], g[3], h[3], across[3];
+    ov_wide w[3], u[3], v[3], across[3];
     w[0] = px - OV_WIDE_LOAD(k, leaf);
     w[1] = py - OV_WIDE_LOAD(k, leaf + OV_LEAF);
     w[2] = pz - OV_WIDE_LOAD(k, leaf + 2 * OV_LEAF);
@@ -162,18 +118,27 @@ static inline ov_wide ov_triangle_distances(float px, float py, float pz,
     for (uint axis = 0; axis < 3; ++axis) {
         u[axis] = OV_WIDE_LOAD(k, leaf + (3 + axis) * OV_LEAF);
         v[axis] = OV_WIDE_LOAD(k, leaf + (6 + axis) * OV_LEAF);
-        g[axis] = OV_WIDE_LOAD(k, leaf + (9 + axis) * OV_LEAF);
-        h[axis] = OV_WIDE_LOAD(k, leaf + (12 + axis) * OV_LEAF);
         across[axis] = v[axis] - u[axis];
     }
     const ov_wide one = 1.0f, zero = 0.0f;
-    const ov_wide along_u = ov_dot(w, u), along_v = ov_dot(w, v), uv = ov_dot(u, across);
-    const ov_wide on_u = clamp(along_u * OV_WIDE_LOAD(k, leaf + 15 * OV_LEAF), zero, one);
-    const ov_wide on_v = clamp(along_v * OV_WIDE_LOAD(k, leaf + 16 * OV_LEAF), zero, one);
-    const ov_wide on_w =
-        clamp((along_v - along_u - uv) * OV_WIDE_LOAD(k, leaf + 17 * OV_LEAF), zero, one);
-    const ov_wide s = clamp(ov_dot(w, g), zero, one);
-    const ov_wide t = clamp(ov_dot(w, h), zero, one - s);
+    const ov_wide along_u = ov_dot(w, u), along_v = ov_dot(w, v);
+    const ov_wide uu = ov_dot(u, u), vv = ov_dot(v, v), uv = ov_dot(u, v);
+    const ov_wide ahead = ov_dot(u, across), length = ov_dot(across, across);
+    const ov_wide foot = along_u * ov_inverse(uu), slant = uv * ov_inverse(uu);
+    const ov_wide on_u = clamp(foot, zero, one);
+    const ov_wide on_v = clamp(along_v * ov_inverse(vv), zero, one);
+    const ov_wide on_w = clamp((along_v - along_u - ahead) * ov_inverse(length), zero, one);
+    /* Across u: what is left of w and v. Both are rounded as much as these are, so that the point
+     * stays near to w's foot in needles, too. */
+    ov_wide rest[3], height[3];
+#pragma unroll
+    for (uint axis = 0; axis < 3; ++axis) {
+        rest[axis] = fma(-foot, u[axis], w[axis]);
+        height[axis] = fma(-slant, u[axis], v[axis]);
+    }
+    const ov_wide rise =
+        clamp(ov_dot(rest, height) * ov_inverse(ov_dot(height, height)), zero, one);
+    const ov_wide s = clamp(fma(-rise, slant, foot), zero, one), t = min(rise, one - s);
     const ov_wide edges = min(min(ov_residue(w, u, v, on_u, zero), ov_residue(w, u, v, zero, on_v)),
                               ov_residue(w, u, v, one - on_w, on_w));
     return min(edges, ov_residue(w, u, v, s, t));
@@ -298,11 +263,13 @@ static inline float ov_nearest(const ov_from *from, const uint points, float bou
  * less. For `each` consecutive points per work-item:
  * corners about the leaf that was nearest to one of them bound the distance of the next, most often
  * by `enough` already. Infinite beyond what a float holds. What is at most `enough` need not be the
- * least, only as much as the distance or more. */
+ * least, only as much as the distance or more. Points that are not between asked_low and asked_high
+ * are not asked for: 0. */
 __kernel void distances(const uint count, const uint each, const uint from,
                         __global const float *restrict xyz, const ov_tree tree,
                         __global const float *restrict boxes, const uint first_leaf,
                         const uint end_leaf, const float4 low, const float4 high,
+                        const float4 asked_low, const float4 asked_high,
                         __global const float *restrict triangles, const uint use_bound,
                         const float enough, const uint to, __global float *restrict squared) {
     /* A copy, made where all work-items still run together: see lists.cl. */
@@ -315,6 +282,11 @@ __kernel void distances(const uint count, const uint each, const uint from,
     for (size_t k = first; k < min(first + each, (size_t)count); ++k) {
         const ov_from point = ov_from_load(xyz + 3 * (from + k), 1);
         const float x = point.x[0], y = point.y[0], z = point.z[0];
+        if (x < asked_low.x || y < asked_low.y || z < asked_low.z || x > asked_high.x ||
+            y > asked_high.y || z > asked_high.z) {
+            squared[to + k] = 0.0f;
+            continue;
+        }
         float bound = use_bound ? squared[to + k] : INFINITY;
         const float bx = max(max(low.x - x, x - high.x), 0.0f),
                     by = max(max(low.y - y, y - high.y), 0.0f),

@@ -67,7 +67,7 @@ typedef float ov_f32;
 
 /* Triangles in a leaf of the tree over a mesh, and floats of each (kernels/distance.cl). */
 #define OV_LEAF 16
-#define OV_TRIANGLE 18
+#define OV_TRIANGLE 9
 
 /* One ellipsoid as the kernels see it: 2^(log2_amplitude - q(z)), q(z) = z^T A z with A already
  * multiplied by log2(e). Coordinates are relative to the points' origin, in angstrom. A float of

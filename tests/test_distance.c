@@ -97,6 +97,38 @@ static void test_one_triangle(void **state) {
     ovoid_mesh_destroy(&mesh);
 }
 
+/* Needles as meshes have them where a surface passes a lattice point, and points in their planes:
+ * rounding moves where the nearest point is along a needle, but not off it. */
+static void test_needles(void **state) {
+    const size_t triangles = test_size(400, 20), count = triangles;
+    double *const xyz = test_alloc(9 * triangles, sizeof *xyz);
+    uint32_t *const corners = test_alloc(3 * triangles, sizeof *corners);
+    float *const points = test_alloc(3 * count, sizeof *points);
+    test_random random = {17};
+    for (size_t t = 0; t < triangles; ++t) {
+        const double high = pow(10.0, random_uniform(&random, -7.0, -2.0)),
+                     s = random_uniform(&random, 0.1, 0.6), r = random_uniform(&random, 0.0, 1.0);
+        double *const corner = xyz + 9 * t;
+        for (size_t k = 0; k < 3; ++k) {
+            const double along = random_uniform(&random, -0.3, 0.3),
+                         aside = high * random_uniform(&random, -1.0, 1.0);
+            corner[k] = (float)random_uniform(&random, -9.0, 9.0);
+            corner[3 + k] = (float)(corner[k] + along);
+            corner[6 + k] = (float)(corner[k] + r * along + aside);
+        }
+        for (size_t k = 0; k < 3; ++k) {
+            const size_t first = 3 * ((t + k) % 3); /* any of its edges is the short one */
+            points[3 * t + k] =
+                (float)((1.0 - s - 0.3) * corner[k] + s * corner[3 + k] + 0.3 * corner[6 + k]);
+            corners[3 * t + k] = (uint32_t)(3 * t + first / 3);
+        }
+    }
+    expect_distances(*state, xyz, 3 * triangles, corners, triangles, points, count, 2e-6);
+    free(xyz);
+    free(corners);
+    free(points);
+}
+
 /* Triangles of every form, points near and far, every number of triangles about a leaf's. */
 static void test_random_triangles(void **state) {
     static const size_t sizes[] = {1, 2, 15, 16, 17, 100, 256, 257, 1000, 9000};
@@ -460,11 +492,17 @@ static void test_refusals(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_one_triangle), cmocka_unit_test(test_random_triangles),
-        cmocka_unit_test(test_spheres),      cmocka_unit_test(test_ways),
-        cmocka_unit_test(test_twin),         cmocka_unit_test(test_repeats),
-        cmocka_unit_test(test_vertices),     cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_far_chunks),   cmocka_unit_test(test_near_chunks),
+        cmocka_unit_test(test_one_triangle),
+        cmocka_unit_test(test_needles),
+        cmocka_unit_test(test_random_triangles),
+        cmocka_unit_test(test_spheres),
+        cmocka_unit_test(test_ways),
+        cmocka_unit_test(test_twin),
+        cmocka_unit_test(test_repeats),
+        cmocka_unit_test(test_vertices),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_far_chunks),
+        cmocka_unit_test(test_near_chunks),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

@@ -92,6 +92,18 @@ static bool out_of_reach(const measuring *m, const float *xyz, size_t count, con
     return box_distance(box, m->box) > most;
 }
 
+/* The box in which distances are asked for, as offsets, and wherever rounding leaves them. */
+static void asked_of(const measuring *m, cl_float4 *low, cl_float4 *high) {
+    const ov_box *const within = m->meter->within;
+    *low = *high = (cl_float4){{0.0f, 0.0f, 0.0f, 0.0f}};
+    for (size_t k = 0; k < 3; ++k) {
+        const double from = within ? within->low[k] - m->facets->origin[k] : -INFINITY,
+                     to = within ? within->high[k] - m->facets->origin[k] : INFINITY;
+        low->s[k] = nextafterf((float)from, -INFINITY);
+        high->s[k] = nextafterf((float)to, INFINITY);
+    }
+}
+
 /* From `count` sites to the chunk on the device: from number `from` of m->there on, or else those
  * given. The squared distances are left on the device, from number `to` on. */
 static ovoid_status launch_batch(ovoid_context *context, measuring *m, const float *xyz,
@@ -105,14 +117,17 @@ static ovoid_status launch_batch(ovoid_context *context, measuring *m, const flo
     const cl_float enough = (cl_float)(meter->enough * meter->enough);
     const cl_float4 low = {{m->box[0], m->box[1], m->box[2], 0.0f}},
                     high = {{m->box[3], m->box[4], m->box[5], 0.0f}};
+    cl_float4 asked_low, asked_high;
+    asked_of(m, &asked_low, &asked_high);
     const cl_mem points = m->there ? m->there->memory : meter->xyz.memory;
     if (!m->there)
         OV_TRY(ov_buffer_write(context, &meter->xyz, 0, xyz, 3 * count * sizeof *xyz));
     OV_TRY(OV_LAUNCH(context, &meter->distances, (count + each - 1) / each, m->group, OV_ARG(total),
                      OV_ARG(each), OV_ARG(from), OV_ARG(points), OV_ARG(m->tree),
                      OV_ARG(facets->boxes.memory), OV_ARG(first_leaf), OV_ARG(end_leaf),
-                     OV_ARG(low), OV_ARG(high), OV_ARG(facets->packed.memory), OV_ARG(use_bound),
-                     OV_ARG(enough), OV_ARG(to), OV_ARG(meter->result.memory)));
+                     OV_ARG(low), OV_ARG(high), OV_ARG(asked_low), OV_ARG(asked_high),
+                     OV_ARG(facets->packed.memory), OV_ARG(use_bound), OV_ARG(enough), OV_ARG(to),
+                     OV_ARG(meter->result.memory)));
 cleanup:
     return status;
 }

@@ -5,6 +5,7 @@
 #ifndef OV_DISTANCE_H
 #define OV_DISTANCE_H
 
+#include "base/box.h"
 #include "measure/facets.h"
 
 /* Points on the device at a time. */
@@ -14,7 +15,8 @@
 typedef struct ov_meter {
     size_t batch;          /* 0: as above */
     const ov_watch *watch; /* asked before each batch; NULL: the context */
-    double enough; /* angstrom: a distance of at most this may be told as more, up to this */
+    double enough;        /* angstrom: a distance of at most this may be told as more, up to this */
+    const ov_box *within; /* of points outside, distances are not asked for: 0; NULL: of all */
     ov_kernel distances, reach;
     ov_buffer xyz, result; /* device */
     ov_later later;        /* the read of distances that are under way */

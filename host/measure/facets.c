@@ -23,11 +23,15 @@ void ov_facets_round(const ov_facets *facets, const ovoid_mesh *mesh, const uint
 /* Vertices are rounded so many at a time, so that the host holds few of them twice. */
 #define PIECE_VERTICES ((size_t)1 << 16)
 
-/* Whether its mesh has left what is wanted there. */
+/* Whether its mesh has left its vertices there. */
 static bool is_on_device(const ov_facets *facets) {
     const ovoid_mesh *const mesh = facets->trail.mesh;
-    return mesh->on_device[OV_ON_DEVICE_OFFSETS].memory && !facets->trail.triangle &&
-           ov_mesh_is_about(mesh, facets->origin);
+    return mesh->on_device[OV_ON_DEVICE_OFFSETS].memory && ov_mesh_is_about(mesh, facets->origin);
+}
+
+/* The same of its triangles, all of which are wanted. */
+static bool are_corners_there(const ov_facets *facets) {
+    return is_on_device(facets) && !facets->trail.triangle;
 }
 
 const ov_buffer *ov_facets_xyz(const ov_facets *facets) {
@@ -98,7 +102,7 @@ ovoid_status ov_facets_load(ovoid_context *context, ov_facets *facets, bool coar
     const size_t total = coarse ? facets->leaves : facets->trail.triangles, from = first * OV_LEAF,
                  to = end * OV_LEAF < total ? end * OV_LEAF : total;
     const cl_uint leaves = (cl_uint)(end - first), triangles = (cl_uint)(to - from);
-    const bool there = is_on_device(facets);
+    const bool there = are_corners_there(facets);
     const cl_mem xyz = ov_facets_xyz(facets)->memory;
     const cl_uint stride = there && coarse ? OV_LEAF : 1,
                   begin = there ? (cl_uint)(from * stride) : 0;
@@ -118,6 +122,8 @@ ovoid_status ov_facets_load(ovoid_context *context, ov_facets *facets, bool coar
     OV_TRY(OV_LAUNCH(context, &facets->pack, leaves, ov_item_group(device), OV_ARG(leaves),
                      OV_ARG(triangles), OV_ARG(begin), OV_ARG(stride), OV_ARG(corners), OV_ARG(xyz),
                      OV_ARG(facets->packed.memory), OV_ARG(facets->leaf_boxes.memory)));
+    if (!coarse && end - first == facets->leaves) /* nobody asks for them again */
+        ov_buffer_destroy(&facets->corners);
     facets->first = first;
     facets->end = end;
     facets->coarse = coarse;

@@ -83,6 +83,40 @@ static inline uint mixed_cells(const corners *c) {
     return any & ~all;
 }
 
+/* Where the lattice ends within a piece, the last point along each axis, it is open: no cell and no
+ * edge lies beyond. Masks of a brick's points: those that are before the end along all axes have a
+ * cell, and along one an edge if they are not beyond the others' ends. */
+typedef struct within {
+    uint cells, edges[3];
+} within;
+
+/* Points of a brick, the first at `first` along x, y or z, that are before `end`. */
+static inline uint before_x(uint first, uint end) {
+    return ((1u << min(max(end, first) - first, (uint)OV_BRICK_X)) - 1) * 0x1111u;
+}
+
+static inline uint before_y(uint first, uint end) {
+    return ((1u << 4 * min(max(end, first) - first, (uint)OV_BRICK_Y)) - 1) * 0x0101u;
+}
+
+static inline uint before_z(uint first, uint end) {
+    return (1u << 8 * min(max(end, first) - first, (uint)OV_BRICK_Z)) - 1;
+}
+
+/* brick: its place in the grid; last: of the lattice's points, from the piece's corner. */
+static inline within find_within(uint3 brick, uint3 last) {
+    const uint x = brick.x * OV_BRICK_X, y = brick.y * OV_BRICK_Y, z = brick.z * OV_BRICK_Z;
+    const uint3 before = (uint3)(before_x(x, last.x), before_y(y, last.y), before_z(z, last.z));
+    const uint3 up_to =
+        (uint3)(before_x(x, last.x + 1), before_y(y, last.y + 1), before_z(z, last.z + 1));
+    within w;
+    w.cells = before.x & before.y & before.z;
+    w.edges[0] = before.x & up_to.y & up_to.z;
+    w.edges[1] = up_to.x & before.y & up_to.z;
+    w.edges[2] = up_to.x & up_to.y & before.z;
+    return w;
+}
+
 static inline uint case_of(const corners *c, uint point) {
     uint index = 0;
     for (uint k = 0; k < 8; ++k)
@@ -115,25 +149,28 @@ __kernel void march_signs(const uint bricks, const uint run, const float isovalu
 
 /* For the nx * ny * nz bricks of the piece, in raster order: masks of crossed edges into `crossing`
  * (of the padded grid), number of vertices + 256 * number of triangles into `found` (of the piece,
- * by place). */
+ * by place). last: of find_within(). */
 __kernel void march_count(const uint nx, const uint ny, const uint nz, const uint run,
-                          __global const uint *restrict place, __global const uint *restrict sign,
-                          __global const uchar *restrict cases, __global uint4 *restrict crossing,
-                          __global uint *restrict found) {
+                          const uint4 last, __global const uint *restrict place,
+                          __global const uint *restrict sign, __global const uchar *restrict cases,
+                          __global uint4 *restrict crossing, __global uint *restrict found) {
     const uint bricks = nx * ny * nz;
     const uint first = get_global_id(0) * run, end = min(first + run, bricks);
     for (uint k = first; k < end; ++k) {
-        const uint brick = (k / (nx * ny) * (ny + 1) + k / nx % ny) * (nx + 1) + k % nx;
+        const uint3 at = (uint3)(k % nx, k / nx % ny, k / (nx * ny));
+        const uint brick = (at.z * (ny + 1) + at.y) * (nx + 1) + at.x;
         if (is_uniform(sign, brick, nx, ny)) {
             crossing[brick] = (uint4)(0, 0, 0, 0);
             found[place[brick]] = 0;
             continue;
         }
         const corners c = load_corners(sign, brick, nx, ny);
+        const within w = find_within(at, last.xyz);
         uint count = 0;
-        for (uint cells = mixed_cells(&c); cells; cells &= cells - 1)
+        for (uint cells = mixed_cells(&c) & w.cells; cells; cells &= cells - 1)
             count += cases[case_of(&c, lowest_bit(cells)) * OV_CASE_BYTES];
-        const uint x = c.at[0] ^ c.at[1], y = c.at[0] ^ c.at[2], z = c.at[0] ^ c.at[4];
+        const uint x = (c.at[0] ^ c.at[1]) & w.edges[0], y = (c.at[0] ^ c.at[2]) & w.edges[1],
+                   z = (c.at[0] ^ c.at[4]) & w.edges[2];
         crossing[brick] = (uint4)(0, x, y, z);
         found[place[brick]] = popcount(x) + popcount(y) + popcount(z) + (count << 8);
     }
@@ -305,10 +342,10 @@ __kernel void march_boxes(const uint packs, const uint vertices, const float spa
 }
 
 /* The triangles of the listed bricks, three vertex numbers each, behind those that are there
- * `before`. */
+ * `before`. last: of find_within(). */
 __kernel void march_triangles(const uint count, const uint before,
                               __global const uint4 *restrict list, const uint nx, const uint ny,
-                              __global const uint *restrict sign,
+                              const uint4 last, __global const uint *restrict sign,
                               __global const uchar *restrict cases,
                               __global const uint4 *restrict crossing,
                               __global uint *restrict corner) {
@@ -317,8 +354,11 @@ __kernel void march_triangles(const uint count, const uint before,
         return;
     const uint brick = list[item].x;
     const corners c = load_corners(sign, brick, nx, ny);
+    const uint3 place =
+        (uint3)(brick % (nx + 1), brick / (nx + 1) % (ny + 1), brick / ((nx + 1) * (ny + 1)));
+    const within w = find_within(place, last.xyz);
     size_t at = ((size_t)before + list[item].z) * 3;
-    for (uint cells = mixed_cells(&c); cells; cells &= cells - 1) {
+    for (uint cells = mixed_cells(&c) & w.cells; cells; cells &= cells - 1) {
         const uint point = lowest_bit(cells);
         __global const uchar *const entry = cases + case_of(&c, point) * OV_CASE_BYTES;
         const uint edges = 3u * entry[0];

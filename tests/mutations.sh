@@ -22,6 +22,7 @@ host/measure/distance.c|distance|chunks nearly as far as the best are skipped|s/
 host/measure/bound.c|bound|a triangle reaches no farther than its corners|s|return farthest + sqrt(longest_edge(p->at) / 3.0);|return farthest;|
 host/measure/bound.c|bound|nothing inside triangles is beyond a limit|s/\*told = distance > b->limits->limit;/*told = false;/
 host/measure/bound.c|+bound|what is left over is forgotten|s/b->bound->most = fmax(b->bound->most, b->now.fragment\[n\].most);/;/
+kernels/distance.cl|distance|across a needle is along it|s/rest\[axis\] = fma(-foot, u\[axis\], w\[axis\]);/rest[axis] = w[axis];/
 kernels/distance.cl|bound|the nearest corner counts|s/max(farthest, ov_triangle_distances/min(farthest, ov_triangle_distances/
 host/fit/l1/l1.c|l1|no evaluation after a failed search|s/failures > 0) .*$/false)/
 host/fit/l1/l1.c|l1|a trial that is no model ends the fit|s/if (status != OVOID_ERROR_NUMERIC)/if (true)/
@@ -50,8 +51,11 @@ host/fit/adaptive/grow.c|fitter|ellipsoids that strayed are left alone|s/g->befo
 host/fit/adaptive/tolerance.c|+adaptive|what confirming added stays|s/effort > 1 \&\& ov_trial_holds/effort > 99 \&\& ov_trial_holds/
 host/mesh/speck_terms.c|speck_terms|small terms are missed between rows|s/^        from += step;/        from += 2 * step;/
 host/measure/spots.c|judge|spots are not thinned|s/if (square < apart \* apart)/if (false)/
-host/measure/near.c|near|no piece that leaves the box is hidden|s/seen->hidden_count == 0 || ov_grid_near/true || ov_grid_near/
-host/measure/near.c|near|the end of a mesh joins what it cuts|s/find_pieces(e->mesh, &e->sure, piece)/find_pieces(e->mesh, \&(ov_box){{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}}, piece)/
+host/measure/excerpt.c|near|nothing that leaves the box is hidden|s/(seen->hidden_count == 0 || ov_grid_near/(true || ov_grid_near/
+host/measure/excerpt.c|near|all that leaves the region is outer|s/region->hidden\[nearest\] ? -1 : 1/1/
+host/measure/excerpt.c|near|what is open is told by its volume|s/component_of\[v\]\] = true;/component_of[v]] = false;/
+host/measure/excerpt.c|near|points outside the box are none|s/within = asked->box;/within = \&(ov_box){{1e9, 1e9, 1e9}, {1e9, 1e9, 1e9}};/
+host/mesh/march.c|clip|a clipped mesh is closed|s/m->clipped \&\& axis < 3/false \&\& axis < 3/
 host/measure/near.c|near|spots elsewhere are forgotten|s/if (!is_in_any(n, seen->spots.spot\[k\].at))/if (!is_in_any(n, seen->spots.spot[k].at) \&\& false)/
 host/measure/judge.c|+near|none near changes are none|s/(\*spot_count == 0 \&\& !near_will_do)/(near_will_do \&\& false)/
 host/mesh/components.c|mesh|walls of cavities are outer|s/mesh->component\[c\].outer = mesh->component\[c\].volume > 0.0;/mesh->component[c].outer = true;/

@@ -1,5 +1,6 @@
 /*
- * Judging models near their changes: what is found there is what judging all of the model finds.
+ * Judging models in boxes, near their changes or where no more than a region counts: what is found
+ * there is what judging all of the model finds.
  */
 #include "measure/changes.h"
 #include "measure/judge.h"
@@ -269,12 +270,109 @@ static void other_questions(void **state) {
     ov_judge_destroy(&judge);
 }
 
+/* ---- a region -------------------------------------------------------------------------------- */
+
+/* A stretch of the tube, from which its cavity leads on both ways, its end, one side of its wall,
+ * or a stretch of an open tube, which has no cavity; nothing else counts, however far off it is:
+ * for the other judge no more than nearly so, which judges all of it. */
+enum { STRETCH, END, SIDE, OPEN, REGIONS };
+
+static void choose_region(judges *j, int kind) {
+    const double length = APART * (double)rings();
+    const ov_box region = {{kind == END ? -9.0 : 0.3 * length, kind == SIDE ? 3.4 : -12.0, -12.0},
+                           {kind == END ? 9.0 : 0.7 * length, 12.0, 12.0}};
+    j->knows.region = j->knows_not.region = region;
+    j->knows.in_region = j->knows_not.in_region = true;
+    j->knows.stray = INFINITY;
+    j->knows_not.stray = 1e6;
+    j->knows.seen.known = false;
+}
+
+/* Changes all along the tube, outwards and, where it is open, inwards. Returns how many there are.
+ */
+static size_t change_all(test_random *random, int kind, size_t changes, const double *xyzr,
+                         ov_quadric *quadrics) {
+    size_t count = gaussians();
+    make_model(xyzr, quadrics);
+    if (kind == OPEN)
+        count = rings() * EACH;
+    for (size_t n = 0; n < changes; ++n, ++count) {
+        const size_t i = (size_t)random_uniform(random, 0.0, (double)(rings() * EACH));
+        quadrics[count] = quadrics[i];
+        for (size_t k = 1; k < 3; ++k)
+            quadrics[count].centre[k] *= random_uniform(random, kind == OPEN ? 0.6 : 1.0, 1.5);
+    }
+    return count;
+}
+
+static void judge_region(ovoid_context *context, int kind) {
+    double *const xyzr = test_alloc(4 * atoms(), sizeof *xyzr);
+    ov_quadric *const quadrics = test_alloc(gaussians() + 64, sizeof *quadrics);
+    const size_t own = kind == OPEN ? rings() * EACH : atoms();
+    test_random random = {19};
+    judges j = {.near = 0};
+    size_t with_spots = 0;
+    make_atoms(xyzr);
+    test_check(context,
+               ov_judge_create(context, xyzr, own, 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows));
+    test_check(context,
+               ov_judge_create(context, xyzr, own, 0.5, 1.0, 0.5, (ov_watch){0}, &j.knows_not));
+    choose_region(&j, kind);
+    for (size_t round = 0; round < test_size(8, 3); ++round) {
+        const size_t count = change_all(&random, kind, 2 * round, xyzr, quadrics);
+        j.knows.seen.known = false; /* not near changes */
+        judge_both(context, &j, quadrics, count);
+        with_spots += j.knows.seen.spots.count > 0;
+        assert_true(j.knows.known.about.triangles < j.knows.mesh->triangles);
+        assert_true(j.knows.laid == &j.knows.known.about);
+    }
+    print_message("%zu of %zu with spots\n", with_spots, j.known);
+    assert_true(with_spots > 0 && with_spots < j.known && j.near == 0);
+    free(xyzr);
+    free(quadrics);
+    ov_judge_destroy(&j.knows);
+    ov_judge_destroy(&j.knows_not);
+}
+
+static void a_region_is_what_whole_is(void **state) {
+    test_skip_simulated(*state);
+    if (strstr(ovoid_context_device(*state)->platform, "rusticl"))
+        skip(); /* as above */
+    for (int kind = 0; kind < REGIONS; ++kind)
+        judge_region(*state, kind);
+}
+
+/* Where one of the two has no surface in the region, all of the model is judged. */
+static void nothing_in_the_region(void **state) {
+    const double xyzr[8] = {0.0, 0.0, 0.0, 1.5, 12.0, 0.0, 0.0, 1.5};
+    const ov_box region = {{-4.0, -4.0, -4.0}, {4.0, 4.0, 4.0}};
+    ov_quadric both[2];
+    ov_judge judge;
+    ov_judgement judgement;
+    for (size_t i = 0; i < 2; ++i)
+        ov_quadric_of_atom(xyzr + 4 * i, 0.5, &both[i]);
+    for (size_t lacks = 0; lacks < 2; ++lacks) { /* the model, or the original, has none there */
+        ov_spot *spots;
+        size_t spot_count;
+        test_check(*state, ov_judge_create(*state, xyzr + 4 * lacks, 2 - lacks, 0.5, 1.0, 0.5,
+                                           (ov_watch){0}, &judge));
+        judge.in_region = true;
+        judge.region = region;
+        judge.stray = INFINITY;
+        test_check(*state, ov_judge_spots(&judge, both + 1 - lacks, 1 + lacks, LEAST, 1.0, 9,
+                                          &judgement, &spots, &spot_count));
+        print_message("%zu spots, %g off\n", spot_count, judgement.deviation);
+        assert_true(spot_count > 0 && judgement.deviation > 8.0);
+        free(spots);
+        ov_judge_destroy(&judge);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(boxes_are_about_changes),
-        cmocka_unit_test(too_many_changes),
-        cmocka_unit_test(near_is_what_whole_is),
-        cmocka_unit_test(other_questions),
+        cmocka_unit_test(boxes_are_about_changes),   cmocka_unit_test(too_many_changes),
+        cmocka_unit_test(near_is_what_whole_is),     cmocka_unit_test(other_questions),
+        cmocka_unit_test(a_region_is_what_whole_is), cmocka_unit_test(nothing_in_the_region),
     };
     return cmocka_run_group_tests(tests, test_open, test_close);
 }

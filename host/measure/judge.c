@@ -89,6 +89,7 @@ ovoid_status ov_judge_create(ovoid_context *context, const double *xyzr, size_t 
     OV_TRY(ov_marcher_create(context, &made.near_marcher));
     OV_TRY(mesh_original(&made, xyzr, atoms, decay));
     ov_marcher_stay(made.marcher);
+    ov_buffers_trim(context);
     *judge = made;
 cleanup:
     if (status != OVOID_OK)
@@ -109,6 +110,7 @@ void ov_judge_destroy(ov_judge *judge) {
     ov_facets_destroy(&judge->facets);
     ov_facets_destroy(&judge->other);
     ov_seen_destroy(&judge->seen);
+    ov_region_destroy(&judge->known);
     ov_marcher_destroy(&judge->near_marcher);
     ov_trail_destroy(&judge->trail);
     ovoid_mesh_destroy(&judge->mesh);
@@ -145,10 +147,10 @@ static bool is_judged(const ov_judge *judge, const double at[3], double distance
            !is_excused(judge, at, distance);
 }
 
-bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, const bool *exposed,
-                     size_t vertex, double distance, bool *outer) {
+bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, double distance,
+                     bool *outer) {
     double at[3];
-    *outer = judge->whole || (exposed ? exposed[vertex] : ov_mesh_is_exposed(mesh, vertex));
+    *outer = judge->whole || ov_mesh_is_exposed(mesh, vertex);
     if (!judge->in_region)
         return true;
     ov_mesh_at(mesh, vertex, at);
@@ -161,8 +163,7 @@ static void add_spots(const ov_judge *judge, const ovoid_mesh *mesh, const float
                       double least, ov_spot *spots, size_t *count) {
     bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v)
-        if (distance[v] >= least && ov_judge_counts(judge, mesh, NULL, v, distance[v], &outer) &&
-            outer) {
+        if (distance[v] >= least && ov_judge_counts(judge, mesh, v, distance[v], &outer) && outer) {
             if (spots) {
                 ov_mesh_at(mesh, v, spots[*count].at);
                 spots[*count].distance = distance[v];
@@ -176,7 +177,7 @@ static void judge_distances(const ov_judge *judge, const ovoid_mesh *mesh, const
     bool outer;
     for (size_t v = 0; v < mesh->vertices; ++v) {
         if (distance[v] <= judgement->deviation ||
-            !ov_judge_counts(judge, mesh, NULL, v, distance[v], &outer))
+            !ov_judge_counts(judge, mesh, v, distance[v], &outer))
             continue; /* the deviation is never above the other */
         judgement->hausdorff = fmax(judgement->hausdorff, distance[v]);
         if (outer)
@@ -200,16 +201,23 @@ static void trial_destroy(trial *t) {
     ovoid_mesh_destroy(&t->mesh);
 }
 
-/* Not before somebody asks for distances: of a part that is to have a number of ellipsoids nobody
- * does, and the facets are the largest that a judge has on the device. */
+ovoid_status ov_judge_lay(ov_judge *judge, const ov_trail *trail) {
+    ovoid_status status = OVOID_OK;
+    if (judge->laid == trail || (judge->laid && judge->laid == &judge->trail))
+        return OVOID_OK;
+    judge->laid = NULL;
+    OV_TRY(ov_facets_set(judge->context, &judge->facets, trail, judge->origin));
+    judge->laid = trail;
+cleanup:
+    return status;
+}
+
+/* All of it. */
 static ovoid_status lay_original(ov_judge *judge) {
     ovoid_status status = OVOID_OK;
-    if (judge->laid)
-        return OVOID_OK;
     if (!judge->trail.mesh)
         OV_TRY(ov_trail_create(judge->context, judge->mesh, false, &judge->trail));
-    OV_TRY(ov_facets_set(judge->context, &judge->facets, &judge->trail, judge->origin));
-    judge->laid = true;
+    OV_TRY(ov_judge_lay(judge, &judge->trail));
 cleanup:
     return status;
 }
@@ -279,7 +287,7 @@ static ovoid_status look_inside(const ov_judge *judge, ov_meter *meter, ov_facet
     if (!counted)
         return OVOID_ERROR_MEMORY;
     for (size_t v = 0; v < from->mesh->vertices; ++v)
-        counted[v] = ov_judge_counts(judge, from->mesh, NULL, v, distance[v], &outer) && outer
+        counted[v] = ov_judge_counts(judge, from->mesh, v, distance[v], &outer) && outer
                          ? distance[v]
                          : -1.0f;
     const ovoid_status status =
@@ -366,6 +374,41 @@ static ovoid_status look_near(ov_judge *judge, const ov_quadric *quadrics, size_
     return status;
 }
 
+/* All of them, where these are all in the judge's region. */
+static ovoid_status look_in_region(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                   double least, ov_judgement *judgement, ov_spot **spots,
+                                   size_t *spot_count, bool *looked) {
+    ov_spot_list found = {0};
+    double farthest;
+    const ovoid_status status =
+        ov_judge_region(judge, quadrics, count, least, &found, &farthest, looked);
+    *judgement = (ov_judgement){.valid = true,
+                                .hausdorff = farthest,
+                                .deviation = farthest,
+                                .area_error = NAN,
+                                .volume_ratio = NAN,
+                                .score = NAN};
+    *spots = found.spot;
+    *spot_count = found.count;
+    return status;
+}
+
+/* All of them, of all that counts of the model. */
+static ovoid_status look_at_all(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                                double least, ov_judgement *judgement, ov_spot **spots,
+                                size_t *spot_count) {
+    bool looked;
+    if (!ov_judge_is_regional(judge) || !has_outer(judge->mesh))
+        return look_everywhere(judge, quadrics, count, least, judgement, spots, spot_count);
+    const ovoid_status status =
+        look_in_region(judge, quadrics, count, least, judgement, spots, spot_count, &looked);
+    if (status != OVOID_OK || looked)
+        return status;
+    free(*spots);
+    *spots = NULL;
+    return look_everywhere(judge, quadrics, count, least, judgement, spots, spot_count);
+}
+
 /* near_will_do: also where there are none near what has changed. */
 static ovoid_status look(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
                          bool near_will_do, ov_judgement *judgement, ov_spot **spots,
@@ -379,7 +422,7 @@ static ovoid_status look(ov_judge *judge, const ov_quadric *quadrics, size_t cou
     free(*spots);
     *spots = NULL;
     *spot_count = 0;
-    return look_everywhere(judge, quadrics, count, least, judgement, spots, spot_count);
+    return look_at_all(judge, quadrics, count, least, judgement, spots, spot_count);
 }
 
 /* Leaves those that are wanted, or none after a failure. */

@@ -8,6 +8,7 @@
 #include "field/quadric.h"
 #include "measure/distance.h"
 #include "mesh/march.h"
+#include "neighbours/neighbours.h"
 
 /* A place where an outer surface is far from the other surface. */
 typedef struct ov_spot {
@@ -41,6 +42,16 @@ typedef struct ov_seen {
     ov_box box; /* of the mesh when all of it was judged */
 } ov_seen;
 
+/* What a judge knows of the original where no more than a region counts. */
+typedef struct ov_region {
+    ov_trail own, about; /* what is in the region; and about it, as far as `room` */
+    double room;         /* angstrom; 0: nothing is known yet */
+    double *outside;     /* owned: 3 * outside_count, the vertices about it but not in it, */
+    bool *hidden;        /* owned: and which of them are of no outer surface */
+    size_t outside_count;
+    ov_grid grid; /* of them */
+} ov_region;
+
 /* The original's surface, meshed once: a light mesh without normals, whose triangles stay on the
  * device. mesh is NULL where the field never reaches the isovalue. */
 typedef struct ov_judge {
@@ -55,9 +66,10 @@ typedef struct ov_judge {
     ov_marcher *marcher;
     ov_meter meter, back; /* of distances from the original, and to it */
     ov_facets facets;     /* of the original, */
-    bool laid;            /* once these are there */
+    const ov_trail *laid; /* as far as it is there; NULL: it is not */
     ov_facets other;      /* of the model at hand, or of a part of it */
     ov_seen seen;
+    ov_region known;
     ov_marcher *near_marcher; /* of what is near changes */
     double slack;             /* set by the owner, see ov_judge_spots() */
     bool closely;             /* set by the owner: less is left out where spots are looked for */

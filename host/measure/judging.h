@@ -7,10 +7,9 @@
 #include "measure/bound.h"
 #include "measure/judge.h"
 
-/* Whether a vertex that is so far off counts; *outer: as one of an outer surface. exposed: whether
- * each vertex is of such a surface; NULL: as the mesh says. */
-bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, const bool *exposed,
-                     size_t vertex, double distance, bool *outer);
+/* Whether a vertex that is so far off counts; *outer: as one of an outer surface. */
+bool ov_judge_counts(const ov_judge *judge, const ovoid_mesh *mesh, size_t vertex, double distance,
+                     bool *outer);
 
 /* Distances below this are only bounded where spots are looked for that are `least` off. */
 double ov_judge_enough(const ov_judge *judge, double least);
@@ -27,6 +26,26 @@ typedef struct ov_listing {
 } ov_listing;
 ovoid_status ov_list_spot(const double at[3], double distance, void *listing);
 
+/* Lays a part of the original, or all of it, on the device, to measure distances to: those to what
+ * is not of the part may be told as more. Does nothing where all of it is there. Not before
+ * somebody asks for distances: of a part that is to have a number of ellipsoids nobody does, and
+ * triangles are the largest that a judge has on the device. trail: stays as long as it is laid. */
+ovoid_status ov_judge_lay(ov_judge *judge, const ov_trail *trail);
+
+/* ---- in a region (region.c) ------------------------------------------------------------------ */
+
+/* Whether only what lies in the judge's region counts, however far off the rest is: such a model is
+ * judged there alone. */
+bool ov_judge_is_regional(const ov_judge *judge);
+
+/* All spots there, and the model is taken note of; *farthest: the largest distance that counts,
+ * exact where it is not much below `least`. *looked is false, and nothing known, where one of the
+ * two has no surface there. */
+ovoid_status ov_judge_region(ov_judge *judge, const ov_quadric *quadrics, size_t count,
+                             double least, ov_spot_list *found, double *farthest, bool *looked);
+
+void ov_region_destroy(ov_region *region);
+
 /* ---- near changes (near.c) ------------------------------------------------------------------- */
 
 /* Looks for spots only where the model is not what it was when it was seen last, and takes note of
@@ -40,6 +59,10 @@ ovoid_status ov_judge_near(ov_judge *judge, const ov_quadric *quadrics, size_t c
 ovoid_status ov_judge_remember(ov_judge *judge, const ov_quadric *quadrics, size_t count,
                                const ovoid_mesh *mesh, double least, const ov_spot *spots,
                                size_t spot_count);
+
+/* Takes note of a model and its spots alone. */
+ovoid_status ov_seen_model(ov_judge *judge, const ov_quadric *quadrics, size_t count, double least,
+                           const ov_spot *spots, size_t spot_count);
 
 void ov_seen_destroy(ov_seen *seen);
 

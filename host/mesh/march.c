@@ -57,7 +57,8 @@ typedef struct ov_marcher {
 
     ov_brick_grid grid;
     double clip[2][3];   /* the box that they end at, angstrom, */
-    bool clipped;        /* if there is one */
+    bool clipped;        /* if there is one, */
+    ov_box ends;         /* and where the lattice did */
     double share;        /* of the isovalue, from which on terms count; 0: OV_MARCH_CUTOFF */
     uint64_t wanted[3];  /* points of pieces, so that the grid stays; 0: nothing is wanted */
     double grid_spacing; /* angstrom */
@@ -348,6 +349,21 @@ static ovoid_status begin_lists(ovoid_context *context, marcher *m, ov_lists *li
                   : ov_lists_build(context, lists, points, &m->terms, 0.0);
 }
 
+/* Beyond all points of a piece. */
+#define ENDLESS 65536
+
+/* The last lattice point along each axis, from the piece's first one. */
+static cl_uint4 last_points(const marcher *m) {
+    cl_uint4 last = {{ENDLESS, ENDLESS, ENDLESS, 0}};
+    for (int axis = 0; m->clipped && axis < 3; ++axis) {
+        const int64_t first =
+                          m->pieces.origin[axis] + (int64_t)(m->at[axis] * m->pieces.size[axis]),
+                      left = m->pieces.last[axis] - first;
+        last.s[axis] = left < 0 ? 0 : left < ENDLESS ? (cl_uint)left : ENDLESS;
+    }
+    return last;
+}
+
 /* Signs, crossed edges, numbers of vertices and triangles along the curve. */
 static ovoid_status classify(ovoid_context *context, marcher *m) {
     ovoid_status status = OVOID_OK;
@@ -355,15 +371,16 @@ static ovoid_status classify(ovoid_context *context, marcher *m) {
     const cl_uint padded = (cl_uint)grid->padded_total, total = (cl_uint)grid->total,
                   nx = (cl_uint)grid->bricks[0], ny = (cl_uint)grid->bricks[1],
                   nz = (cl_uint)grid->bricks[2], before = (cl_uint)m->vertices;
+    const cl_uint4 last = last_points(m);
     const cl_float isovalue = (cl_float)m->options->isovalue;
     const size_t scan = m->run > 1 ? 1 : OV_SCAN_GROUP;
     OV_TRY(OV_LAUNCH(context, &m->kernel[SIGNS], (padded + m->run - 1) / m->run, m->group,
                      OV_ARG(padded), OV_ARG(m->run), OV_ARG(isovalue), OV_ARG(m->brick_of.memory),
                      OV_ARG(m->value.memory), OV_ARG(m->sign.memory)));
     OV_TRY(OV_LAUNCH(context, &m->kernel[COUNT], (total + m->run - 1) / m->run, m->group,
-                     OV_ARG(nx), OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(m->place.memory),
-                     OV_ARG(m->sign.memory), OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
-                     OV_ARG(m->found.memory)));
+                     OV_ARG(nx), OV_ARG(ny), OV_ARG(nz), OV_ARG(m->run), OV_ARG(last),
+                     OV_ARG(m->place.memory), OV_ARG(m->sign.memory), OV_ARG(m->cases.memory),
+                     OV_ARG(m->crossing.memory), OV_ARG(m->found.memory)));
     OV_TRY(OV_LAUNCH(context, &m->kernel[NUMBER], scan, scan, OV_ARG(total), OV_ARG(before),
                      OV_ARG(m->brick_of.memory), OV_ARG(m->found.memory), OV_ARG(m->list.memory),
                      OV_ARG(m->totals.memory)));
@@ -601,8 +618,9 @@ static ovoid_status place_vertices(ovoid_context *context, marcher *m, size_t pa
 
 static ovoid_status fill_triangles(ovoid_context *context, marcher *m, cl_uint before) {
     const cl_uint nx = (cl_uint)m->grid.bricks[0], ny = (cl_uint)m->grid.bricks[1];
+    const cl_uint4 last = last_points(m);
     return OV_LAUNCH(context, &m->kernel[TRIANGLES], m->active, m->group, OV_ARG(m->active),
-                     OV_ARG(before), OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny),
+                     OV_ARG(before), OV_ARG(m->list.memory), OV_ARG(nx), OV_ARG(ny), OV_ARG(last),
                      OV_ARG(m->sign.memory), OV_ARG(m->cases.memory), OV_ARG(m->crossing.memory),
                      OV_ARG(m->corners.memory));
 }
@@ -961,8 +979,9 @@ static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
     bool sparse;
     const ovoid_mesh_options *const o = m->options;
     ov_pieces *const best = &m->pieces;
+    const uint64_t *const wanted = m->clipped ? NULL : m->wanted; /* of whole meshes */
     OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, m->cutoff, o->spacing, limit,
-                            m->wanted, m->clipped ? m->clip : NULL, best));
+                            wanted, m->clipped ? m->clip : NULL, best));
     sparse = (double)best->count[0] * (double)best->count[1] * (double)best->count[2] >
              EMPTY_SHARE * (double)best->pieces;
     for (size_t k = 0; k < sizeof sparse_limits / sizeof *sparse_limits; ++k) {
@@ -970,13 +989,17 @@ static ovoid_status plan(ovoid_context *context, marcher *m, size_t count,
         if (k == 0 ? points_of(best) <= EMPTY_POINTS : !sparse)
             continue;
         OV_TRY(ov_pieces_create(context, m->bodies, count, o->isovalue, m->cutoff, o->spacing,
-                                sparse_limits[k], m->wanted, m->clipped ? m->clip : NULL, &other));
+                                sparse_limits[k], wanted, m->clipped ? m->clip : NULL, &other));
         if (cost_of(&other) < cost_of(best)) {
             const ov_pieces swap = *best;
             *best = other;
             other = swap;
         }
         ov_pieces_destroy(&other);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        m->ends.low[axis] = (double)best->origin[axis] * o->spacing;
+        m->ends.high[axis] = (double)best->last[axis] * o->spacing;
     }
 cleanup:
     return status;
@@ -1056,6 +1079,8 @@ ovoid_status ov_march_light(ovoid_context *context, const ov_body *bodies, size_
 }
 
 static const uint64_t piece_limit[3] = OV_MARCH_PIECE;
+/* Of meshes that are clipped so that they take little, an eighth of the memory. */
+static const uint64_t clipped_limit[3] = {128, 128, 64};
 
 ovoid_status ov_mesh_bodies(ovoid_context *context, ov_store *store, const ov_body *bodies,
                             size_t count, const ovoid_mesh_options *options, ovoid_mesh **mesh) {
@@ -1089,16 +1114,25 @@ ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **result) {
 
 void ov_marcher_stay(ov_marcher *m) {
     static const uint64_t limit[3] = OV_MARCH_PIECE;
+    uint64_t wanted[3] = {0, 0, 0};
     for (size_t axis = 0; axis < 3 && m->grid.total > 0; ++axis) {
-        m->wanted[axis] = m->grid.bricks[axis] * brick_points[axis] + WANTED_MORE;
-        m->wanted[axis] = m->wanted[axis] < limit[axis] ? m->wanted[axis] : limit[axis];
+        wanted[axis] = m->grid.bricks[axis] * brick_points[axis] + WANTED_MORE;
+        wanted[axis] = wanted[axis] < limit[axis] ? wanted[axis] : limit[axis];
     }
+    release_work(m);
+    memcpy(m->wanted, wanted, sizeof wanted);
 }
 
 void ov_marcher_clip(ov_marcher *m, const double low[3], const double high[3]) {
+    m->clipped = low;
+    if (!low)
+        return;
     memcpy(m->clip[0], low, sizeof m->clip[0]);
     memcpy(m->clip[1], high, sizeof m->clip[1]);
-    m->clipped = true;
+}
+
+ov_box ov_marcher_ends(const ov_marcher *m) {
+    return m->ends;
 }
 
 void ov_marcher_cut_off(ov_marcher *m, double share) {
@@ -1124,7 +1158,10 @@ ovoid_status ov_mesh_bodies_light(ovoid_context *context, ov_marcher *kept, cons
                                   size_t count, const ovoid_mesh_options *options,
                                   const double origin[3], const ov_watch *watch, bool normals,
                                   ovoid_mesh **mesh) {
-    const plan_of_mesh how = {
-        .limit = piece_limit, .origin = origin, .watch = watch, .specks = true, .bare = !normals};
+    const plan_of_mesh how = {.limit = kept->clipped ? clipped_limit : piece_limit,
+                              .origin = origin,
+                              .watch = watch,
+                              .specks = true,
+                              .bare = !normals};
     return march(context, kept, bodies, count, options, &how, mesh);
 }

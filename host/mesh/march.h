@@ -4,6 +4,7 @@
 #ifndef OV_MARCH_H
 #define OV_MARCH_H
 
+#include "base/box.h"
 #include "mesh/mesh.h"
 #include "mesh/pieces.h"
 #include "ovoid/ovoid.h"
@@ -41,21 +42,28 @@ ovoid_status ov_marcher_create(ovoid_context *context, ov_marcher **marcher);
 void ov_marcher_destroy(ov_marcher **marcher);
 
 /* The next meshes have pieces a little larger than the last one, where that is enough for them:
- * then what depends on the size of pieces is not made anew each time. */
+ * then what depends on the size of pieces is not made anew each time. Nothing else of the last one
+ * stays: the lists of a molecule's atoms take far more memory than those of its models. */
 void ov_marcher_stay(ov_marcher *marcher);
 
 /* What is launched for the next meshes does not go with those before: of them, only memory and the
  * size of pieces stays. */
 void ov_marcher_begin(ov_marcher *marcher);
 
-/* The next meshes end at this box, which may be endless: only what lies in it, less a few steps of
- * the lattice, is what the whole mesh would have there. */
+/* The next meshes end at this box, which may be endless, or up to two steps beyond, and are open
+ * there: where a step of the lattice is not enough to miss something, they are what the whole mesh
+ * is there. NULL: they are whole. */
 void ov_marcher_clip(ov_marcher *marcher, const double low[3], const double high[3]);
+
+/* Where the lattice of the last one ended, angstrom: what is open there has vertices in these
+ * planes, and nothing has any beyond but specks. */
+ov_box ov_marcher_ends(const ov_marcher *marcher);
 
 /* Terms count in the next meshes where they are at least this share of the isovalue. */
 void ov_marcher_cut_off(ov_marcher *marcher, double share);
 
-/* As those two, in pieces of OV_MARCH_PIECE and with the specks (specks.h). The full one is kept in
+/* As those two, in pieces of OV_MARCH_PIECE, or of an eighth of that if the mesh is clipped, and
+ * with the specks (specks.h). The full one is kept in
  * the store, which may be NULL, and shares it. The light one knows its components only after
  * ov_mesh_finish(), so that the device can have something to do meanwhile; normals: whether it is
  * to have them. */

@@ -327,7 +327,7 @@ static ovoid_mesh *take_arrays(ovoid_context *context, const ovoid_mesh *arrays)
     return NULL;
 }
 
-ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
+ovoid_status ov_mesh_connect(ovoid_context *context, ovoid_mesh *mesh) {
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_mesh_check(context, mesh));
     if (mesh->xyz && !mesh->normals)
@@ -342,9 +342,13 @@ ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
     if (mesh->xyz)
         OV_TRY(check_edges(context, mesh));
     OV_TRY(ov_progress_ask(context));
-    OV_TRY(ov_mesh_expose(context, mesh));
 cleanup:
     return status;
+}
+
+ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh) {
+    const ovoid_status status = ov_mesh_connect(context, mesh);
+    return status == OVOID_OK ? ov_mesh_expose(context, mesh) : status;
 }
 
 ovoid_status ov_mesh_adopt(ovoid_context *context, ov_store *store, double *xyz, float *normals,

@@ -71,6 +71,8 @@ ovoid_status ov_mesh_adopt_light(ovoid_context *context, float *offsets, const d
                                  float *normals, size_t vertices, uint32_t *corners,
                                  size_t triangles, ovoid_mesh **mesh);
 ovoid_status ov_mesh_finish(ovoid_context *context, ovoid_mesh *mesh);
+/* The same, but which components are exposed is still to be found (exposed.h). */
+ovoid_status ov_mesh_connect(ovoid_context *context, ovoid_mesh *mesh);
 ovoid_status ov_mesh_check(ovoid_context *context, const ovoid_mesh *mesh);
 
 /* Leaves of a light mesh where its vertices are and how they hang together, on the host. */

@@ -182,6 +182,7 @@ static ovoid_status plan(ovoid_context *context, const planner *p, const uint64_
         const uint64_t size = (uint64_t)(high[axis] - low[axis]) + 3;
         const uint64_t count = (size + limit[axis] - 1) / limit[axis];
         pieces->origin[axis] = (int64_t)low[axis] - 1;
+        pieces->last[axis] = (int64_t)high[axis] + 1;
         pieces->size[axis] = (size + count * brick[axis] - 1) / (count * brick[axis]) * brick[axis];
         if (wanted && wanted[axis] >= pieces->size[axis] && wanted[axis] <= limit[axis] &&
             (double)wanted[axis] <= WANTED_MOST * (double)pieces->size[axis])

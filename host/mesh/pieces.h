@@ -34,6 +34,7 @@ typedef struct ov_pieces {
     int64_t origin[3]; /* lattice indices of the first piece's first point */
     uint64_t size[3];  /* points of a piece, whole bricks */
     uint64_t count[3]; /* pieces per axis */
+    int64_t last[3];   /* lattice indices at which the lattice ends if it was clipped, open */
     size_t pieces;     /* of these, the ones that may meet the surface: */
     uint64_t *key;     /* (z * count[1] + y) * count[0] + x, ascending */
     size_t *start;     /* terms of piece p: term[start[p]] .. term[start[p + 1] - 1], */
@@ -45,8 +46,8 @@ typedef struct ov_pieces {
  * bricks within the limit; NULL: nothing is. Where no term reaches isovalue / count, phi <
  * isovalue; so a piece in which none does, one lattice step about it included, is left out. A piece
  * has the terms that reach cutoff in it, the lattice step included. OVOID_ERROR_LIMIT when the
- * lattice is too large. No pieces at all are not an error here. clip: a box, angstrom, at
- * which the lattice ends; NULL: none. */
+ * lattice is too large. No pieces at all are not an error here. clip: a box, angstrom, a step
+ * beyond which the lattice ends; NULL: none. */
 ovoid_status ov_pieces_create(ovoid_context *context, const ov_body *bodies, size_t count,
                               double isovalue, double cutoff, double spacing,
                               const uint64_t limit[3], const uint64_t wanted[3], double clip[2][3],

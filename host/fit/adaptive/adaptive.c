@@ -231,12 +231,26 @@ static ovoid_status judge(ov_adaptive *f, size_t count, ov_judgement *judgement)
     return ov_judge_model(&f->judge, f->quadrics, all, judgement);
 }
 
+/* How far off it is where the tolerance may be lost; of a part where it has a say, as before. */
+static ovoid_status judge_tolerance(ov_adaptive *f, size_t count, ov_judgement *judgement) {
+    ov_spot *spots = NULL;
+    size_t spot_count;
+    if (f->around.atoms == 0)
+        return judge(f, count, judgement);
+    const size_t all = ov_adaptive_surround(f, count);
+    const ovoid_status status =
+        ov_judge_spots(&f->judge, f->quadrics, all, f->options->adaptive.tolerance,
+                       ov_tuned.spots_apart, 1, judgement, &spots, &spot_count);
+    free(spots);
+    return status;
+}
+
 /* Distances only matter on the way where a tolerance may be lost. */
 static ovoid_status judge_volume(ov_adaptive *f, size_t count, ov_judgement *judgement) {
     ovoid_status status = OVOID_OK;
     *judgement = (ov_judgement){.valid = true};
     if (f->options->adaptive.goal == OVOID_GOAL_TOLERANCE)
-        OV_TRY(judge(f, count, judgement));
+        OV_TRY(judge_tolerance(f, count, judgement));
     if (f->options->adaptive.goal != OVOID_GOAL_TOLERANCE || f->around.atoms > 0)
         OV_TRY(ov_adaptive_volume(f, count, &judgement->volume_ratio));
 cleanup:

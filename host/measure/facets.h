@@ -13,7 +13,7 @@
 #include "measure/trail.h"
 #include "shared.h"
 
-/* Leaves of OV_LEAF triangles on the device at a time, no fewer than OV_GROUP: at least so many (38
+/* Leaves of OV_LEAF triangles on the device at a time, no fewer than OV_GROUP: at least so many (19
  * MB), or what this share of its memory holds, since a second chunk has all points looked at again.
  */
 #define OV_FACETS_CHUNK ((size_t)1 << 15)

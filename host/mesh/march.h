@@ -51,8 +51,8 @@ void ov_marcher_stay(ov_marcher *marcher);
 void ov_marcher_begin(ov_marcher *marcher);
 
 /* The next meshes end at this box, which may be endless, or up to two steps beyond, and are open
- * there: where a step of the lattice is not enough to miss something, they are what the whole mesh
- * is there. NULL: they are whole. */
+ * there: what they have is what the whole mesh has, but for specks beside the end. NULL: they are
+ * whole. */
 void ov_marcher_clip(ov_marcher *marcher, const double low[3], const double high[3]);
 
 /* Where the lattice of the last one ended, angstrom: what is open there has vertices in these

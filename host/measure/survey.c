@@ -1,5 +1,6 @@
 #include "measure/surveyor.h"
 
+#include "base/parallel.h"
 #include "base/progress.h"
 #include "mesh/exposed.h"
 #include "mesh/union.h"
@@ -130,21 +131,23 @@ static uint32_t image_at(const ov_surveyor *s, const double at[3]) {
             largest = near[n];
         }
     }
-    if (largest == OV_NOBODY)
+    for (size_t k = 0; k < OV_SURVEY_NEAREST && largest == OV_NOBODY; ++k)
         largest =
-            ov_grid_nearest(&s->nearest, s->original->quadric.centre, sizeof *s->original, at);
+            ov_grid_nearest(&s->nearest[k], s->original->quadric.centre, sizeof *s->original, at);
     return largest == OV_NOBODY ? NO_IMAGE : s->options->image[largest];
 }
 
+/* Cells as wide as terms count would have most of them asked for each place. */
 static ovoid_status tell_images_apart(ov_surveyor *s) {
     ovoid_status status = OVOID_OK;
+    double reach = s->options->nearest > 0.0 ? s->options->nearest : NEAREST_WITHIN;
     if (!s->options->image || s->original_count == 0)
         return OVOID_OK;
     OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
                       s->original_count, LARGEST_WITHIN, &s->largest));
-    OV_TRY(
-        ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original, s->original_count,
-                   s->options->nearest > 0.0 ? s->options->nearest : NEAREST_WITHIN, &s->nearest));
+    for (size_t k = OV_SURVEY_NEAREST; k-- > 0; reach *= 0.5)
+        OV_TRY(ov_grid_of(s->context, s->original->quadric.centre, sizeof *s->original,
+                          s->original_count, reach, &s->nearest[k]));
 cleanup:
     return status;
 }
@@ -218,11 +221,28 @@ static bool is_near(const ov_surveyor *s, const ovoid_mesh *mesh, size_t triangl
     return s->options->halo > 0.0;
 }
 
+/* Triangles whose zones are found one after the other. */
+#define STRETCH 4096
+
+typedef struct zones {
+    const ov_surveyor *surveyor;
+    ov_sheet *sheet;
+} zones;
+
+static void find_some_zones(size_t k, void *user) {
+    const zones *const of = user;
+    const ov_surveyor *const s = of->surveyor;
+    const ovoid_mesh *const mesh = of->sheet->mesh;
+    const size_t end = (k + 1) * STRETCH < mesh->triangles ? (k + 1) * STRETCH : mesh->triangles;
+    for (size_t t = k * STRETCH; t < end; ++t)
+        of->sheet->zone[t] = is_inside(s, mesh, t) ? OV_ZONE_CELL
+                             : is_near(s, mesh, t) ? OV_ZONE_HALO
+                                                   : OV_ZONE_BEYOND;
+}
+
 static void find_zones(const ov_surveyor *s, ov_sheet *at) {
-    for (size_t t = 0; t < at->mesh->triangles; ++t)
-        at->zone[t] = is_inside(s, at->mesh, t) ? OV_ZONE_CELL
-                      : is_near(s, at->mesh, t) ? OV_ZONE_HALO
-                                                : OV_ZONE_BEYOND;
+    zones of = {.surveyor = s, .sheet = at};
+    ov_parallel((at->mesh->triangles + STRETCH - 1) / STRETCH, find_some_zones, &of);
 }
 
 size_t ov_sheet_unite(const ov_sheet *at, int least, uint32_t *of) {
@@ -594,7 +614,8 @@ static void close_survey(ov_surveyor *s) {
     }
     ov_facets_destroy(&s->facets);
     ov_grid_destroy(&s->largest);
-    ov_grid_destroy(&s->nearest);
+    for (size_t k = 0; k < OV_SURVEY_NEAREST; ++k)
+        ov_grid_destroy(&s->nearest[k]);
     ov_meter_destroy(&s->meter);
     ov_marcher_destroy(&s->marcher);
 }

@@ -9,6 +9,8 @@
 
 #define OV_NO_PIECE UINT32_MAX
 
+#define OV_SURVEY_NEAREST 3
+
 /* Where a triangle is. What lies beyond cell and halo may be an artefact of where the terms end. */
 enum { OV_ZONE_BEYOND, OV_ZONE_HALO, OV_ZONE_CELL }; /* from the outside to the inside */
 
@@ -37,8 +39,10 @@ typedef struct ov_surveyor {
     double origin[3];
     const ov_body *original;
     size_t original_count;
-    ov_grid largest, nearest; /* the original's terms, where images have to be told apart */
-    ov_watch watch;           /* leaves questions to the context, where the cells are counted */
+    /* The original's terms, where images have to be told apart: the largest is looked for in one
+     * grid, the nearest in one after the other. */
+    ov_grid largest, nearest[OV_SURVEY_NEAREST];
+    ov_watch watch; /* leaves questions to the context, where the cells are counted */
     ov_marcher *marcher;
     ov_meter meter;
     ov_facets facets; /* of the triangles that count */

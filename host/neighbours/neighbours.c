@@ -277,6 +277,22 @@ static void nearest_in_cell(const ov_grid *grid, const ov_cell_members *cell, co
 /* What rounding may do to the cell of a point, as a share of the reach. */
 #define CELL_ROUNDING 1e-6
 
+/* The square of how far a place is from the cell that is this many cells away, at least. */
+static double square_to_cell(const ov_cells *cells, const double at[3], const int32_t home[3],
+                             const int step[3]) {
+    double square = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        const double in = at[k] - corner_of(cells, home, k);
+        const double off = step[k] < 0 ? in : step[k] > 0 ? cells->edge - in : 0.0;
+        const double least = fmax(off - CELL_ROUNDING * cells->edge, 0.0);
+        square += least * least;
+    }
+    return square;
+}
+
+/* The 27 cells about a place, its own first. */
+static const int8_t about[3] = {0, -1, 1};
+
 uint32_t ov_grid_nearest(const ov_grid *grid, const double *points, size_t stride,
                          const double at[3]) {
     nearest best = {OV_NOBODY, INFINITY};
@@ -284,8 +300,10 @@ uint32_t ov_grid_nearest(const ov_grid *grid, const double *points, size_t strid
     int32_t home[3];
     ov_cells_place(&grid->cells, at, home);
     for (int n = 0; n < 27; ++n) {
-        const int32_t place[3] = {home[0] + n % 3 - 1, home[1] + n / 3 % 3 - 1,
-                                  home[2] + n / 9 - 1};
+        const int step[3] = {about[n % 3], about[n / 3 % 3], about[n / 9]};
+        const int32_t place[3] = {home[0] + step[0], home[1] + step[1], home[2] + step[2]};
+        if (square_to_cell(&grid->cells, at, home, step) > fmin(best.square, sure * sure))
+            continue;
         const uint32_t number = ov_cells_find(&grid->cells, place);
         if (number != OV_NO_CELL)
             nearest_in_cell(grid, grid->members + number, points, stride, at, &best);

@@ -45,6 +45,10 @@ host/field/lists.c|l1_objective|lists cover a third of the skin|s|(skin + (doubl
 host/fit/adaptive/solver.c|solver|the tolerance of conjugate gradients|s/(cl_float)(tolerance \* tolerance)/(cl_float)(1e4 * tolerance)/
 host/fit/adaptive/refine.c|refine|no bound of axes|s/^    ov_factor_bound_decay(to, least);//
 host/fit/adaptive/adaptive.c|+adaptive|calibration in the wrong direction|s/(1.0 - volume_ratio) \/ per_log/(volume_ratio - 1.0) \/ per_log/
+kernels/images.cl|solver|what images feel is lost|s/sum\[k\] += back\[k\];/sum[k] += 0.0f * back[k];/
+kernels/images.cl|checks|images turn the other way|s/turn_vector(r, 0, c + 1, turned + 1);/turn_vector(r, 1, c + 1, turned + 1);/
+host/fit/adaptive/images.c|refine|images are where their ellipsoids are|s/ov_quadric_move(&quadrics\[i\], &f->motion\[g\], &quadrics\[place\]);/quadrics[place] = quadrics[i];/
+host/fit/adaptive/local.c|local|images of those that stay are left out|s/skins, ov_followers_all(followers, taken),/skins, which ? ov_followers_all(followers, taken) : taken,/
 host/fit/adaptive/local.c|local|points are not found anew|s/m->escaped =$/m->escaped = false \&\&/
 host/fit/adaptive/merge.c|merge|a split forgets the variance|s/half.decay\[2\] \/= shrink;//
 host/fit/adaptive/grow.c|fitter|ellipsoids that strayed are left alone|s/g->before\[n\] < g->patience || ov_reach_at/true || ov_reach_at/

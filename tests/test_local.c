@@ -189,6 +189,36 @@ static void all_chosen_is_everything(void **state) {
     row_destroy(&r);
 }
 
+/* Of some of a row whose images stand beside it: those of the chosen follow, and those of the
+ * others stay, so that the whole gains what is said. */
+static void images_follow_those_chosen(void **state) {
+    const ov_rigid beside = {.rotation = {1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0},
+                             .shift = {1.0, 2.0, 0.0}};
+    row r;
+    ov_local local = {.refiner = {.context = *state}};
+    ov_refiner whole = {.context = *state};
+    const ov_refine_options none = options_of(0);
+    double before, after;
+    test_check(*state, ov_followers_set(*state, &local.refiner.followers, &beside, 1));
+    test_check(*state, ov_followers_set(*state, &whole.followers, &beside, 1));
+    row_create(&r, *state, test_size(9, 4), 0.02, 3);
+    bool *const chosen = test_alloc(r.s.count, sizeof *chosen);
+    for (size_t i = 0; i < r.s.count; ++i)
+        chosen[i] = i < 3;
+    test_check(*state, ov_refine(&whole, &r.s.target, &none, r.x, r.s.count, &before));
+    const double some_before = refine_some(&local, &r, 0, chosen, r.x);
+    const double some_after = refine_some(&local, &r, (uint32_t)test_size(12, 3), chosen, r.x);
+    test_check(*state, ov_refine(&whole, &r.s.target, &none, r.x, r.s.count, &after));
+    print_message("misfit %g -> %g, of the whole %g -> %g\n", some_before, some_after, before,
+                  after);
+    assert_true(some_after < 0.9 * some_before);
+    expect_near(after - before, some_after - some_before, 1e-3 * before, "what the whole gained");
+    free(chosen);
+    ov_local_destroy(&local);
+    ov_refiner_destroy(&whole);
+    row_destroy(&r);
+}
+
 /* Nobody, or one that reaches no point: nothing to do. */
 static void none_chosen_changes_nothing(void **state) {
     row r;
@@ -281,6 +311,7 @@ int main(void) {
         cmocka_unit_test(a_second_time_equals_a_first),
         cmocka_unit_test(who_escapes_is_followed),
         cmocka_unit_test(all_chosen_is_everything),
+        cmocka_unit_test(images_follow_those_chosen),
         cmocka_unit_test(none_chosen_changes_nothing),
         cmocka_unit_test(cancelling_leaves_all_as_it_was),
         cmocka_unit_test(far_ellipsoids_cost_little),

@@ -15,17 +15,25 @@ enum { P = OV_FACTOR_PARAMETERS };
 typedef struct problem {
     scene s;
     double *x;
-    size_t size; /* bytes of x */
+    size_t count; /* ellipsoids with parameters: the first of the mixture */
+    size_t size;  /* bytes of x */
 } problem;
 
-static void problem_create(problem *p, ovoid_context *context, size_t count, double share,
-                           uint64_t seed) {
+/* With images of them in the mixture. */
+static void problem_create_of(problem *p, ovoid_context *context, size_t count,
+                              const ov_followers *followers, double share, uint64_t seed) {
     test_random random = {seed};
     ov_target_options options;
     ov_target_options_init(&options);
-    ov_quadric *const quadrics = scene_ellipsoids(&random, count);
-    scene_create(&p->s, context, quadrics, count, 0.5, 1.0, test_size(6, 16) / 10.0,
+    const size_t all = ov_followers_all(followers, count);
+    ov_quadric *const own = scene_ellipsoids(&random, count);
+    ov_quadric *const quadrics = test_alloc(all, sizeof *quadrics);
+    memcpy(quadrics, own, count * sizeof *own);
+    free(own);
+    ov_followers_place(followers, count, quadrics, NULL);
+    scene_create(&p->s, context, quadrics, all, 0.5, 1.0, test_size(6, 16) / 10.0,
                  test_small() ? 3.5 : 4.5, &options);
+    p->count = count;
     p->size = count * P * sizeof *p->x;
     p->x = test_alloc(count * P, sizeof *p->x);
     for (size_t i = 0; i < count; ++i) {
@@ -36,6 +44,12 @@ static void problem_create(problem *p, ovoid_context *context, size_t count, dou
                     (k < OV_FACTOR_L ? 1.0 : 0.5); /* L is about 0.6 */
     }
     free(quadrics);
+}
+
+static void problem_create(problem *p, ovoid_context *context, size_t count, double share,
+                           uint64_t seed) {
+    const ov_followers none = {0};
+    problem_create_of(p, context, count, &none, share, seed);
 }
 
 static void problem_destroy(problem *p) {
@@ -187,6 +201,39 @@ static void a_mixture_is_found_again(void **state) {
     }
     assert_true(refiner.list_builds < refiner.evaluations); /* skins are of use */
     free_record(&r);
+    ov_refiner_destroy(&refiner);
+    problem_destroy(&p);
+}
+
+/* Near an axis that their images turn about, so that each of them overlaps its own: a mixture of
+ * them and of images that follow is found again, too. */
+static void images_follow(void **state) {
+    test_skip_simulated(*state);
+    const ov_rigid motion[2] = {
+        {.rotation = {-0.5, -sqrt(0.75), 0.0, sqrt(0.75), -0.5, 0.0, 0.0, 0.0, 1.0}},
+        {.rotation = {-0.5, sqrt(0.75), 0.0, -sqrt(0.75), -0.5, 0.0, 0.0, 0.0, 1.0}}};
+    problem p;
+    ov_refiner refiner = {.context = *state};
+    double misfit, before;
+    const ov_refine_options options = options_of((uint32_t)test_size(40, 8));
+    test_check(*state, ov_followers_set(*state, &refiner.followers, motion, 2));
+    problem_create_of(&p, *state, test_size(4, 2), &refiner.followers, 0.1, 4);
+    test_check(*state, ov_refine_evaluate(&refiner, &p.s.target, p.x, p.count, &before));
+    test_check(*state, ov_refine(&refiner, &p.s.target, &options, p.x, p.count, &misfit));
+    print_message("misfit %g -> %g\n", before, misfit);
+    assert_true(misfit < test_size(1, 100) * 1e-4 * before);
+    for (size_t i = 0; i < p.count && !test_small(); ++i)
+        for (size_t k = 0; k < 3; ++k)
+            expect_near(p.x[i * P + OV_FACTOR_CENTRE + k], p.s.quadrics[i].centre[k], 0.02,
+                        "a centre");
+    double *const all = test_alloc(p.s.count * P, sizeof *all);
+    for (size_t i = 0; i < p.count; ++i)
+        ov_factor_quadric(p.x + i * P, &p.s.quadrics[i]);
+    ov_followers_place(&refiner.followers, p.count, p.s.quadrics, NULL);
+    for (size_t i = 0; i < p.s.count; ++i)
+        ov_factor_of_quadric(&p.s.quadrics[i], all + i * P);
+    expect_near(misfit_of(&p.s, all), misfit, 1e-3 * misfit + 1e-7 * before, "in double");
+    free(all);
     ov_refiner_destroy(&refiner);
     problem_destroy(&p);
 }
@@ -434,6 +481,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(evaluation_equals_twin),
         cmocka_unit_test(a_mixture_is_found_again),
+        cmocka_unit_test(images_follow),
         cmocka_unit_test(the_misfit_never_rises),
         cmocka_unit_test(lists_with_skins_say_the_same),
         cmocka_unit_test(lists_follow_jumps),

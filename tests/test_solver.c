@@ -252,10 +252,11 @@ typedef struct problem {
     ov_problem own;
 } problem;
 
-static void create_problem(problem *p, ovoid_context *context, size_t count, size_t points,
-                           size_t lost, uint64_t seed) {
+static void create_problem_of(problem *p, ovoid_context *context, size_t count,
+                              const ov_rigid *motion, size_t images, size_t points, size_t lost,
+                              uint64_t seed) {
     test_random random = {seed};
-    ov_quadric *const quadrics = test_alloc(count, sizeof *quadrics);
+    ov_quadric *const quadrics = test_alloc(count * (1 + images), sizeof *quadrics);
     const double half = 1.2 * cbrt((double)count);
     double *const x = test_alloc(count * P, sizeof *x);
     for (size_t i = 0; i < count; ++i) {
@@ -267,7 +268,10 @@ static void create_problem(problem *p, ovoid_context *context, size_t count, siz
         ov_factor_quadric(x + i * P, &quadrics[i]);
     }
     float *const xyz = random_points(&random, points, half + 2.0);
-    bench_create(&p->b, context, quadrics, count, xyz, points, 1e-30);
+    for (size_t g = 0; g < images; ++g)
+        for (size_t i = 0; i < count; ++i)
+            ov_quadric_move(&quadrics[i], &motion[g], &quadrics[(g + 1) * count + i]);
+    bench_create(&p->b, context, quadrics, count * (1 + images), xyz, points, 1e-30);
     const size_t all = p->b.points.packs * OV_PACK;
     float *const weight = test_alloc(all, sizeof *weight), *const u = test_alloc(all, sizeof *u);
     for (size_t k = 0; k < points; ++k) {
@@ -278,12 +282,19 @@ static void create_problem(problem *p, ovoid_context *context, size_t count, siz
                           .terms = &p->b.terms,
                           .lists = &p->b.lists,
                           .operations = &p->b.operations,
+                          .count = count,
                           .x = x,
                           .weight = weight,
                           .u = u};
     test_check(context, ov_problem_upload(context, &p->own));
+    test_check(context, ov_followers_set(context, &p->own.followers, motion, images));
     free(xyz);
     free(quadrics);
+}
+
+static void create_problem(problem *p, ovoid_context *context, size_t count, size_t points,
+                           size_t lost, uint64_t seed) {
+    create_problem_of(p, context, count, NULL, 0, points, lost, seed);
 }
 
 static void destroy_problem(problem *p) {
@@ -293,7 +304,7 @@ static void destroy_problem(problem *p) {
 
 static double *solve(problem *p, ov_solver *solver, double lambda, uint32_t iterations,
                      double tolerance) {
-    double *const step = test_alloc(p->b.terms_count * P, sizeof *step);
+    double *const step = test_alloc(p->own.count * P, sizeof *step);
     test_check(p->b.context, ov_problem_solve(p->b.context, &p->own, solver, lambda, iterations,
                                               tolerance, step));
     return step;
@@ -301,13 +312,14 @@ static double *solve(problem *p, ov_solver *solver, double lambda, uint32_t iter
 
 /* Error of a step in the norm of the matrix, as a share of the dense solution. */
 static double error_of(const problem *p, const double *step, double lambda) {
-    const size_t count = p->b.terms_count, size = count * P;
+    const size_t count = p->own.count, size = count * P;
     double *const matrix = test_alloc(size * size, sizeof *matrix);
     double *const factored = test_alloc(size * size, sizeof *factored);
     double *const wanted = test_alloc(size, sizeof *wanted);
     double error = 0.0, whole = 0.0;
-    assert_true(ov_twin_system(p->own.x, count, p->b.xyz, p->own.weight, p->own.u, p->b.count,
-                               lambda, matrix, wanted));
+    assert_true(ov_twin_system(p->own.x, count, p->own.followers.motion, p->own.followers.count,
+                               p->b.xyz, p->own.weight, p->own.u, p->b.count, lambda, matrix,
+                               wanted));
     memcpy(factored, matrix, size * size * sizeof *matrix);
     assert_true(ov_twin_solve(factored, size, wanted));
     for (size_t i = 0; i < size; ++i)
@@ -456,6 +468,31 @@ static void ellipsoids_without_points(void **state) {
     destroy_problem(&p);
 }
 
+/* Images about the axes that they turn by, where they overlap: the step is that of the parameters
+ * that all of them have in common. Without damping, since D is that of the ellipsoids alone. */
+static void images_follow(void **state) {
+    const ov_rigid motion[2] = {
+        {.rotation = {0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0}, .shift = {0.5, 0.0, 0.0}},
+        {.rotation = {0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0}, .shift = {0.0, 0.0, -0.3}}};
+    const size_t counts[] = {1, 3};
+    for (size_t n = 0; n < test_size(2, 1); ++n) {
+        problem p;
+        ov_solver together = {.apart = true}, alone = {0};
+        create_problem_of(&p, *state, counts[n], motion, 2, test_size(600, 100), 0, 20 + n);
+        double *const one = solve(&p, &alone, 0.0, 300, 1e-7);
+        double *const many = solve(&p, &together, 0.0, 300, 1e-7);
+        const double error[2] = {error_of(&p, one, 0.0), error_of(&p, many, 0.0)};
+        print_message("%zu ellipsoids with images: error %.1e and %.1e after %llu iterations\n",
+                      counts[n], error[0], error[1], (unsigned long long)alone.iterations);
+        assert_true(error[0] < 1e-3 && error[1] < 1e-3);
+        free(one);
+        free(many);
+        ov_solver_destroy(&alone);
+        ov_solver_destroy(&together);
+        destroy_problem(&p);
+    }
+}
+
 static void no_residual_no_step(void **state) {
     problem p;
     ov_solver solver = {0};
@@ -542,6 +579,7 @@ int main(void) {
         cmocka_unit_test(little_is_waited_for),
         cmocka_unit_test(the_device_stops),
         cmocka_unit_test(ellipsoids_without_points),
+        cmocka_unit_test(images_follow),
         cmocka_unit_test(no_residual_no_step),
         cmocka_unit_test(solutions_repeat),
         cmocka_unit_test(iterations_end),

@@ -127,6 +127,7 @@ ovoid_status ov_check_gather(ov_checking *c);
 ovoid_status ov_check_spread(ov_checking *c);
 ovoid_status ov_check_merge(ov_checking *c);
 ovoid_status ov_check_solver(ov_checking *c);
+ovoid_status ov_check_images(ov_checking *c);
 ovoid_status ov_check_mesh(ov_checking *c);
 ovoid_status ov_check_distances(ov_checking *c);
 ovoid_status ov_check_picture(ov_checking *c);

@@ -60,6 +60,114 @@ cleanup:
     return status;
 }
 
+/* ---- images that follow -------------------------------------------------------------------- */
+
+enum { IMAGES = 3 };
+
+/* Polynomials and moments of terms and of their images, and what is to become of them. */
+typedef struct image_data {
+    size_t count;
+    float *polynomial, *moments;
+    ov_rigid motion[IMAGES];
+} image_data;
+
+static void turn_any_way(ov_random *random, ov_rigid *motion) {
+    const double angle[3] = {ov_random_uniform(random, -3.0, 3.0),
+                             ov_random_uniform(random, -1.5, 1.5),
+                             ov_random_uniform(random, -3.0, 3.0)};
+    double r[3][3];
+    ov_twin_rotation(angle, r);
+    for (size_t k = 0; k < 9; ++k)
+        motion->rotation[k] = r[k / 3][k % 3];
+    for (size_t k = 0; k < 3; ++k)
+        motion->shift[k] = 0.0;
+}
+
+/* turned_n = sum_m turn_nm c_m for each image of each term. */
+static void expect_turned(ov_checking *c, const image_data *d, const float *got) {
+    for (size_t n = 0; n < d->count * IMAGES; ++n) {
+        const float *const own = d->polynomial + n % d->count * OV_MONOMIALS;
+        double turn[OV_MONOMIALS][OV_MONOMIALS];
+        ov_twin_turn(d->motion[n / d->count].rotation, turn);
+        for (size_t k = 0; k < OV_MONOMIALS; ++k) {
+            ov_twin_sum wanted = {0};
+            for (size_t m = 0; m < OV_MONOMIALS; ++m) {
+                wanted.value += turn[k][m] * own[m];
+                wanted.scale += 4.0 * fabs(turn[k][m] * own[m]);
+            }
+            ov_expect_close(c, got[(d->count + n) * OV_MONOMIALS + k], wanted, 4.0,
+                            "turn_polynomials: coefficient", n * OV_MONOMIALS + k);
+        }
+    }
+}
+
+/* Of each term: its own moments and turn^T times those of each image. */
+static void expect_folded(ov_checking *c, const image_data *d, const float *got) {
+    for (size_t i = 0; i < d->count; ++i)
+        for (size_t k = 0; k < OV_MONOMIALS; ++k) {
+            const size_t at = 2 * (i * OV_MONOMIALS + k);
+            ov_twin_sum wanted = {.value = (double)d->moments[at] + d->moments[at + 1],
+                                  .scale = fabs(d->moments[at])};
+            for (size_t g = 0; g < IMAGES; ++g) {
+                const float *const image = d->moments + 2 * ((g + 1) * d->count + i) * OV_MONOMIALS;
+                double turn[OV_MONOMIALS][OV_MONOMIALS];
+                ov_twin_turn(d->motion[g].rotation, turn);
+                for (size_t m = 0; m < OV_MONOMIALS; ++m) {
+                    const double moment = (double)image[2 * m] + image[2 * m + 1];
+                    wanted.value += turn[m][k] * moment;
+                    wanted.scale += 4.0 * fabs(turn[m][k] * moment);
+                }
+            }
+            ov_expect_close(c, (double)got[at] + got[at + 1], wanted, 4.0,
+                            "fold_moments: component", i * OV_MONOMIALS + k);
+        }
+}
+
+static ovoid_status check_following(ov_checking *c, const image_data *d, ov_followers *followers,
+                                    ov_buffer *buffer) {
+    ovoid_status status = OVOID_OK;
+    const size_t all = d->count * (1 + IMAGES) * OV_MONOMIALS;
+    float *turned = NULL, *folded = NULL;
+    OV_TRY(ov_followers_set(c->context, followers, d->motion, IMAGES));
+    OV_TRY(ov_put_floats(c->context, buffer, d->polynomial, all));
+    OV_TRY(ov_followers_turn(c->context, followers, d->count, NULL, buffer));
+    OV_TRY(ov_read_words(c->context, buffer, all, &turned));
+    ov_expect_same(c, turned, d->polynomial, d->count * OV_MONOMIALS, "turn_polynomials: a term's");
+    expect_turned(c, d, turned);
+    OV_TRY(ov_put_floats(c->context, buffer, d->moments, 2 * all));
+    OV_TRY(ov_followers_fold(c->context, followers, d->count, NULL, buffer));
+    OV_TRY(ov_read_words(c->context, buffer, 2 * all, &folded));
+    expect_folded(c, d, folded);
+cleanup:
+    free(turned);
+    free(folded);
+    return status;
+}
+
+ovoid_status ov_check_images(ov_checking *c) {
+    ovoid_status status = OVOID_ERROR_MEMORY;
+    ov_random random = {14};
+    ov_followers followers = {0};
+    ov_buffer buffer = {0};
+    image_data d = {.count = ov_check_size(c, 501, 21)};
+    const size_t all = d.count * (1 + IMAGES) * OV_MONOMIALS;
+    d.polynomial = ov_random_floats(c->context, &random, all, -1.0, 1.0);
+    d.moments = ov_random_floats(c->context, &random, 2 * all, -1.0, 1.0);
+    if (!d.polynomial || !d.moments)
+        goto cleanup;
+    for (size_t k = 1; k < 2 * all; k += 2) /* the low parts */
+        d.moments[k] *= 0x1p-24f;
+    for (size_t g = 0; g < IMAGES; ++g)
+        turn_any_way(&random, &d.motion[g]);
+    status = check_following(c, &d, &followers, &buffer);
+cleanup:
+    free(d.polynomial);
+    free(d.moments);
+    ov_followers_destroy(&followers);
+    ov_buffer_destroy(&buffer);
+    return status;
+}
+
 /* ---- conjugate gradients ------------------------------------------------------------------ */
 
 /* Iterations that are compared, before rounding makes their courses part. */
@@ -92,6 +200,7 @@ static ovoid_status make_problem(ov_checking *c, problem *p) {
                           .terms = &s->terms,
                           .lists = &s->lists,
                           .operations = &s->operations,
+                          .count = s->count,
                           .x = ov_alloc(context, p->size, sizeof(double), "parameters of a check"),
                           .weight = ov_setting_floats(context, s, &random, 0.2, 2.0),
                           .u = ov_setting_floats(context, s, &random, -0.5, 0.5)};
@@ -102,8 +211,8 @@ static ovoid_status make_problem(ov_checking *c, problem *p) {
         goto cleanup;
     for (size_t i = 0; i < s->count; ++i)
         ov_factor_of_quadric(&s->quadrics[i], p->own.x + i * P);
-    if (!ov_twin_system(p->own.x, s->count, s->xyz, p->own.weight, p->own.u, s->places, LAMBDA,
-                        p->matrix, p->right))
+    if (!ov_twin_system(p->own.x, s->count, NULL, 0, s->xyz, p->own.weight, p->own.u, s->places,
+                        LAMBDA, p->matrix, p->right))
         goto cleanup;
     OV_TRY(ov_problem_upload(context, &p->own));
 cleanup:

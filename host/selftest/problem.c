@@ -19,9 +19,12 @@ ovoid_status ov_problem_solve(ovoid_context *context, ov_problem *p, ov_solver *
                               .weight = &p->weights,
                               .moments = &p->moments,
                               .gram = &p->gram,
-                              .parameters = p->x};
+                              .parameters = p->x,
+                              .count = p->count,
+                              .followers = &p->followers};
     OV_TRY(ov_moments(context, p->operations, p->points, p->terms, p->lists, &p->residuals,
                       &p->moments));
+    OV_TRY(ov_followers_fold(context, &p->followers, p->count, NULL, &p->moments));
     OV_TRY(ov_gram(context, p->operations, p->points, p->terms, p->lists, &p->weights, &p->gram));
     OV_TRY(ov_solve(context, solver, p->operations, &system, lambda, iterations, tolerance, step));
 cleanup:
@@ -32,6 +35,7 @@ void ov_problem_destroy(ov_problem *p) {
     ov_buffer *const buffers[] = {&p->weights, &p->residuals, &p->moments, &p->gram};
     for (size_t k = 0; k < sizeof buffers / sizeof *buffers; ++k)
         ov_buffer_destroy(buffers[k]);
+    ov_followers_destroy(&p->followers);
     free(p->x);
     free(p->weight);
     free(p->u);

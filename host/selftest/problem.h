@@ -11,6 +11,8 @@ typedef struct ov_problem {
     const ov_terms *terms;
     const ov_lists *lists;
     ov_operations *operations;
+    ov_followers followers;
+    size_t count;      /* ellipsoids; terms are their images, too */
     double *x;         /* parameters, OV_FACTOR_PARAMETERS per ellipsoid */
     float *weight, *u; /* W and W r at each place, 0 at the fill */
     ov_buffer weights, residuals, moments, gram; /* on the device */

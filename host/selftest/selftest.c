@@ -24,6 +24,7 @@ static const ov_check checks[] = {
     {"merge", "merge_loss", true, false, ov_check_merge},
     {"solver", "solve_start solve_product solve_update solve_direction solve_step", true, false,
      ov_check_solver},
+    {"images", "turn_polynomials fold_moments", true, false, ov_check_images},
     {"mesh",
      "march_signs march_count march_number march_get march_put march_vertices march_boxes "
      "march_triangles march_refine march_place",

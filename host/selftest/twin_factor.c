@@ -75,16 +75,44 @@ void ov_twin_jacobian(const double *parameters, size_t count, const double y[3],
     }
 }
 
-bool ov_twin_system(const double *parameters, size_t count, const double *xyz, const float *weight,
-                    const float *u, size_t points, double lambda, double *matrix, double *right) {
+void ov_twin_jacobian_images(const double *parameters, size_t count, const ov_rigid *motion,
+                             size_t images, const double y[3], double *row, double *work) {
+    ov_twin_jacobian(parameters, count, y, row);
+    for (size_t g = 0; g < images; ++g) {
+        const ov_rigid back = ov_rigid_inverse(&motion[g]);
+        double from[3];
+        ov_rigid_move(&back, y, from);
+        ov_twin_jacobian(parameters, count, from, work);
+        for (size_t j = 0; j < count * OV_FACTOR_PARAMETERS; ++j)
+            row[j] += work[j];
+    }
+}
+
+void ov_twin_turn(const double rotation[9], double turn[OV_MONOMIALS][OV_MONOMIALS]) {
+    static const int place[3][3] = {{4, 5, 6}, {5, 7, 8}, {6, 8, 9}};
+    memset(turn, 0, OV_MONOMIALS * sizeof *turn);
+    turn[0][0] = 1.0;
+    for (int a = 0; a < 3; ++a) /* z_a becomes sum_c R_ca z_c */
+        for (int c = 0; c < 3; ++c)
+            turn[1 + c][1 + a] = rotation[3 * c + a];
+    for (int a = 0; a < 3; ++a)
+        for (int b = a; b < 3; ++b)
+            for (int c = 0; c < 3; ++c)
+                for (int d = 0; d < 3; ++d)
+                    turn[place[c][d]][place[a][b]] += rotation[3 * c + a] * rotation[3 * d + b];
+}
+
+bool ov_twin_system(const double *parameters, size_t count, const ov_rigid *motion, size_t images,
+                    const double *xyz, const float *weight, const float *u, size_t points,
+                    double lambda, double *matrix, double *right) {
     const size_t size = count * OV_FACTOR_PARAMETERS;
-    double *const row = calloc(size > 0 ? size : 1, sizeof *row);
+    double *const row = calloc(2 * size + 1, sizeof *row);
     if (!row)
         return false;
     memset(matrix, 0, size * size * sizeof *matrix);
     memset(right, 0, size * sizeof *right);
     for (size_t k = 0; k < points; ++k) {
-        ov_twin_jacobian(parameters, count, xyz + 3 * k, row);
+        ov_twin_jacobian_images(parameters, count, motion, images, xyz + 3 * k, row, row + size);
         for (size_t i = 0; i < size; ++i) {
             right[i] -= row[i] * u[k];
             for (size_t j = 0; j <= i; ++j)

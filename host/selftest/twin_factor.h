@@ -19,11 +19,22 @@ void ov_twin_factor_map(const double parameters[OV_FACTOR_PARAMETERS],
 /* Row k of J: the derivatives of the sum of `count` ellipsoids at y. */
 void ov_twin_jacobian(const double *parameters, size_t count, const double y[3], double *row);
 
+/* The same with images of them all, which follow them: at y, an image is what it is the image of
+ * where the motion came from. work: as long as the row. */
+void ov_twin_jacobian_images(const double *parameters, size_t count, const ov_rigid *motion,
+                             size_t images, const double y[3], double *row, double *work);
+
+/* How a rotation turns polynomials: those of p(R^T z) are sum_m turn[n][m] c_m. Its transpose takes
+ * moments of an image back. */
+void ov_twin_turn(const double rotation[9], double turn[OV_MONOMIALS][OV_MONOMIALS]);
+
 /* (J^T W J + lambda D) and -J^T W r, with u = W r, and 1 on the diagonal where it is 0, so that
- * what does not matter stays still. matrix: size * size, right: size, with size = count *
- * OV_FACTOR_PARAMETERS. False without memory. */
-bool ov_twin_system(const double *parameters, size_t count, const double *xyz, const float *weight,
-                    const float *u, size_t points, double lambda, double *matrix, double *right);
+ * what does not matter stays still. motion: those of `images` images of all ellipsoids, or NULL.
+ * matrix: size * size, right: size, with size = count * OV_FACTOR_PARAMETERS. False without memory.
+ */
+bool ov_twin_system(const double *parameters, size_t count, const ov_rigid *motion, size_t images,
+                    const double *xyz, const float *weight, const float *u, size_t points,
+                    double lambda, double *matrix, double *right);
 
 /* x := matrix^-1 x by Cholesky's factorisation, which takes the matrix's place. False where it is
  * not positive definite. */

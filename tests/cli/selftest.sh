@@ -10,7 +10,7 @@ expect_silent
 expect_out "check           verdict"
 expect_out "For a bug report:"
 expect_out "(short form)"
-for line in layout tree lists field moments misfit gather spread merge solver mesh distances; do
+for line in layout tree lists field moments misfit gather spread merge solver images mesh distances; do
     grep -q "^$line  *passed " "$out" || fail "the check '$line' should have passed"
 done
 for line in ovoid device platform driver limits kernels costs launch "round trip" "to device"; do
@@ -20,7 +20,7 @@ done
 run "$OVOID" selftest --short --json
 expect_code 0
 expect_silent
-[ "$(grep -c '"verdict":.*"passed"' "$out")" -eq 12 ] || fail "JSON should have 12 checks that passed"
+[ "$(grep -c '"verdict":.*"passed"' "$out")" -eq 13 ] || fail "JSON should have 13 checks that passed"
 for key in launch_seconds round_trip_seconds to_device_bytes_per_second from_device_bytes_per_second; do
     grep -q "\"$key\":.*[1-9]" "$out" || fail "JSON should have '$key'"
 done

@@ -51,24 +51,44 @@ static void bound_part(const ov_adaptive *f, double padding, double part[2][3]) 
     }
 }
 
-/* What is fixed takes its share of the target. */
-static ovoid_status fix_surroundings(ov_adaptive *f) {
+/* The field of these at the points. */
+static ovoid_status evaluate(ov_adaptive *f, const ov_quadric *quadrics, size_t count,
+                             ov_buffer *values) {
     ovoid_status status = OVOID_OK;
     const ov_points *const points = &f->samples.points;
     ov_terms terms = {0};
     ov_lists lists = {.packs_only = true};
     ov_operations operations = {0};
-    ov_buffer values = {0};
-    OV_TRY(ov_terms_set(f->context, &terms, f->around.fixed, f->around.fixed_count, points->origin,
-                        OV_TARGET_CUTOFF));
+    OV_TRY(ov_terms_set(f->context, &terms, quadrics, count, points->origin, OV_TARGET_CUTOFF));
     OV_TRY(ov_lists_build(f->context, &lists, points, &terms, 0.0));
-    OV_TRY(ov_field(f->context, &operations, points, &terms, &lists, &values));
-    OV_TRY(ov_target_fix(f->context, &f->target, &values));
+    OV_TRY(ov_field(f->context, &operations, points, &terms, &lists, values));
 cleanup:
-    ov_buffer_destroy(&values);
     ov_operations_destroy(&operations);
     ov_lists_destroy(&lists);
     ov_terms_destroy(&terms);
+    return status;
+}
+
+/* The field of the start's images. */
+static ovoid_status evaluate_images(ov_adaptive *f, ov_buffer *values) {
+    const size_t count = f->start->count;
+    memcpy(f->quadrics, f->start->quadrics, count * sizeof *f->quadrics);
+    ov_followers_place(&f->refiner.followers, count, f->quadrics, NULL);
+    return evaluate(f, f->quadrics + count, count * f->around.images, values);
+}
+
+/* What is fixed takes its share of the target. Beyond a part nothing of it is to be, but images of
+ * it may be where they were. */
+static ovoid_status fix_surroundings(ov_adaptive *f) {
+    ovoid_status status = OVOID_OK;
+    ov_buffer fixed = {0}, images = {0};
+    OV_TRY(evaluate(f, f->around.fixed, f->around.fixed_count, &fixed));
+    if (f->around.images > 0)
+        OV_TRY(evaluate_images(f, &images));
+    OV_TRY(ov_target_fix(f->context, &f->target, &fixed, f->around.images > 0 ? &images : NULL));
+cleanup:
+    ov_buffer_destroy(&fixed);
+    ov_buffer_destroy(&images);
     return status;
 }
 
@@ -94,7 +114,7 @@ static ovoid_status sample(ov_adaptive *f, const ov_target_options *targets) {
                      band, sampling, &f->samples));
     OV_TRY(
         ov_target_create(f->context, &f->samples, options->decay, isovalue, targets, &f->target));
-    if (f->around.fixed_count > 0)
+    if (f->around.fixed_count > 0 || f->around.images > 0)
         OV_TRY(fix_surroundings(f));
     ov_buffer_destroy(&f->samples.value); /* the target has taken over what it needs */
     ov_buffer_destroy(&f->samples.gradient);
@@ -183,6 +203,9 @@ static ovoid_status prepare(ov_adaptive *f) {
     if (f->prepared)
         return OVOID_OK;
     ov_adaptive_forget(f); /* a part of it may be there */
+    OV_TRY(ov_followers_set(f->context, &f->refiner.followers, f->around.image, f->around.images));
+    OV_TRY(ov_followers_set(f->context, &f->local.refiner.followers, f->around.image,
+                            f->around.images));
     f->spacing =
         options->spacing > 0.0 ? options->spacing : ov_default_spacing(f->atoms, options->decay);
     ov_target_options_init(&targets);

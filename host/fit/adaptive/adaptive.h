@@ -29,11 +29,10 @@ typedef struct ov_surroundings {
     const ov_quadric
         *fixed; /* what stands for these in the model: their Gaussians, or ellipsoids */
     size_t fixed_count;
-    /* Of the unit of a symmetric assembly: what carries it to its images. Images of what is fitted
-     * follow it wherever surfaces are judged; the last `lagging` of what is fixed are those of the
-     * start, which points are refined against. */
+    /* Of the unit of a symmetric assembly: what carries it to its images. Those of what is fitted
+     * follow it. */
     const ov_rigid *image;
-    size_t images, lagging;
+    size_t images;
     ov_box region; /* in which surfaces are held to one another */
     const ov_spot
         *spots;        /* where the start is off: it is mended there, cavities or not, and else */

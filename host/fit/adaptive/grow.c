@@ -15,6 +15,7 @@ typedef struct growth {
     uint32_t *before; /* per spot: how often its place was met before, patience included */
     uint32_t patience;
     bool in_order;
+    ov_spots own;   /* where to act, of each spot */
     bool *chosen;   /* ellipsoids */
     uint32_t *felt; /* those at a place */
 } growth;
@@ -45,6 +46,46 @@ static void split_one(ov_adaptive *f, ov_trial *t, size_t i) {
     f->twin[t->count] = (uint32_t)i;
     ov_split(t->x + i * OV_FACTOR_PARAMETERS, t->x + t->count * OV_FACTOR_PARAMETERS);
     ++t->count;
+}
+
+/* The largest value at a place, as a logarithm, of those that are felt there. */
+static double log_value_at(const ov_reach *reach, const double at[3], uint32_t *found) {
+    double largest = -INFINITY;
+    const size_t felt = ov_reach_at(reach, at, found);
+    for (size_t k = 0; k < felt; ++k)
+        largest = fmax(largest, ov_quadric_log_value(&reach->quadrics[found[k]], at));
+    return largest;
+}
+
+/* A spot may be where an image of an ellipsoid is: what is to be done is done to the ellipsoid, in
+ * the place that the image has carried there. Of places that come to the same, the one where most
+ * is felt. */
+static ovoid_status bring_home(ov_adaptive *f, const ov_trial *t, const ov_spots *spots,
+                               growth *g) {
+    ovoid_status status = OVOID_OK;
+    ov_reach reach = {0};
+    OV_TRY(ov_spots_copy(f->context, spots, &g->own));
+    if (f->around.images == 0)
+        goto cleanup;
+    OV_TRY(ov_reach_create(f->context, t->x, t->count,
+                           log(ov_tuned.refine_cutoff * f->options->isovalue), &reach));
+    for (size_t n = 0; n < spots->count; ++n) {
+        double *const own = g->own.spot[n].at;
+        double largest = log_value_at(&reach, own, g->felt);
+        for (size_t k = 0; k < f->around.images; ++k) {
+            const ov_rigid back = ov_rigid_inverse(&f->around.image[k]);
+            double at[3];
+            ov_rigid_move(&back, spots->spot[n].at, at);
+            const double value = log_value_at(&reach, at, g->felt);
+            if (value > largest) {
+                largest = value;
+                memcpy(own, at, sizeof at);
+            }
+        }
+    }
+cleanup:
+    ov_reach_destroy(&reach);
+    return status;
 }
 
 /* How many ellipsoids are split at a spot. */
@@ -159,10 +200,11 @@ static ovoid_status act(ov_adaptive *f, const char *stage, ov_trial *t, const ov
     ovoid_status status = OVOID_OK;
     OV_TRY(ov_adaptive_emphasise(f, spots, ov_tuned.spots_emphasis_reach, ov_tuned.spots_emphasis));
     OV_TRY(ov_places_meet(f->context, &g->places, spots, ov_tuned.spots_apart, g->before));
-    OV_TRY(rebuild(f, t, spots, g));
-    OV_TRY(call_back(f, t, spots, g));
-    OV_TRY(split(f, t, spots, g));
-    OV_TRY(choose(f, t, spots, 0, UINT32_MAX, ov_tuned.grow_refined, g));
+    OV_TRY(bring_home(f, t, spots, g));
+    OV_TRY(rebuild(f, t, &g->own, g));
+    OV_TRY(call_back(f, t, &g->own, g));
+    OV_TRY(split(f, t, &g->own, g));
+    OV_TRY(choose(f, t, &g->own, 0, UINT32_MAX, ov_tuned.grow_refined, g));
     OV_TRY(ov_adaptive_refine_some(f, t, stage, ov_tuned.refine_local_steps, g->chosen));
     OV_TRY(ov_adaptive_share_atoms(f, t));
     if (!g->in_order)
@@ -194,5 +236,6 @@ cleanup:
     free(g.chosen);
     free(g.felt);
     ov_places_destroy(&g.places);
+    ov_spots_destroy(&g.own);
     return status;
 }

@@ -7,14 +7,16 @@
 
 /* ---- who moves, and who does not ------------------------------------------------------------ */
 
-/* Sets the terms of the ellipsoids with chosen[i] == which. */
+/* Sets the terms of the ellipsoids with chosen[i] == which, and of their images. */
 static ovoid_status set_terms(ov_local *l, const ov_target *target, const double *x, size_t count,
                               const bool *chosen, bool which, float skin, ov_terms *terms) {
     ovoid_status status = OVOID_OK;
     ovoid_context *const context = l->refiner.context;
+    const ov_followers *const followers = &l->refiner.followers;
+    const size_t all = ov_followers_all(followers, count);
     size_t taken = 0;
-    ov_quadric *const quadrics = ov_alloc(context, count, sizeof *quadrics, "ellipsoids");
-    float *const skins = ov_alloc(context, count, sizeof *skins, "skins");
+    ov_quadric *const quadrics = ov_alloc(context, all, sizeof *quadrics, "ellipsoids");
+    float *const skins = ov_alloc(context, all, sizeof *skins, "skins");
     if (!quadrics || !skins) {
         status = OVOID_ERROR_MEMORY;
         goto cleanup;
@@ -24,8 +26,9 @@ static ovoid_status set_terms(ov_local *l, const ov_target *target, const double
             skins[taken] = skin;
             ov_factor_quadric(x + i * OV_FACTOR_PARAMETERS, &quadrics[taken++]);
         }
-    OV_TRY(ov_terms_set_skins(context, terms, quadrics, skins, taken, target->points->origin,
-                              ov_tuned.refine_cutoff));
+    ov_followers_place(followers, taken, quadrics, skins);
+    OV_TRY(ov_terms_set_skins(context, terms, quadrics, skins, ov_followers_all(followers, taken),
+                              target->points->origin, ov_tuned.refine_cutoff));
 cleanup:
     free(quadrics);
     free(skins);

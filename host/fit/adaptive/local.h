@@ -9,7 +9,7 @@
 #include "fit/adaptive/refine.h"
 
 typedef struct ov_local {
-    ov_refiner refiner; /* its context is set by who makes this */
+    ov_refiner refiner; /* its context and followers are set by who makes this */
     ov_terms moving, still;
     ov_lists reached; /* of those that move, over all points */
     ov_lists lists;   /* of those that stay still, over the points kept: these alone */

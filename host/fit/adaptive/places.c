@@ -11,6 +11,15 @@ void ov_spots_destroy(ov_spots *spots) {
     *spots = (ov_spots){0};
 }
 
+ovoid_status ov_spots_copy(ovoid_context *context, const ov_spots *from, ov_spots *to) {
+    ov_spot *const copy = ov_copy(context, from->spot, from->count, sizeof *copy, "spots");
+    if (!copy)
+        return OVOID_ERROR_MEMORY;
+    ov_spots_destroy(to);
+    *to = (ov_spots){.spot = copy, .count = from->count};
+    return OVOID_OK;
+}
+
 void ov_places_destroy(ov_places *places) {
     free(places->place);
     *places = (ov_places){0};

@@ -12,6 +12,8 @@ typedef struct ov_spots {
     size_t count;
 } ov_spots;
 void ov_spots_destroy(ov_spots *spots);
+/* *to has others before, or none. */
+ovoid_status ov_spots_copy(ovoid_context *context, const ov_spots *from, ov_spots *to);
 
 typedef struct ov_place {
     double at[3]; /* angstrom: where it was off last */

@@ -6,15 +6,16 @@
 #include <string.h>
 
 static ovoid_status make_room(ov_refiner *r, size_t count) {
-    if (count <= r->capacity)
-        return OVOID_OK;
+    const size_t all = ov_followers_all(&r->followers, count);
+    ovoid_status status = ov_grow(r->context, &r->quadrics, &r->quadrics_capacity, all,
+                                  sizeof *r->quadrics, "ellipsoids");
+    if (status != OVOID_OK || count <= r->capacity)
+        return status;
     free(r->trial);
     free(r->step);
-    free(r->quadrics);
     r->trial = ov_alloc(r->context, count * OV_FACTOR_PARAMETERS, sizeof *r->trial, "parameters");
     r->step = ov_alloc(r->context, count * OV_FACTOR_PARAMETERS, sizeof *r->step, "parameters");
-    r->quadrics = ov_alloc(r->context, count, sizeof *r->quadrics, "ellipsoids");
-    r->capacity = r->trial && r->step && r->quadrics ? count : 0;
+    r->capacity = r->trial && r->step ? count : 0;
     return r->capacity ? OVOID_OK : OVOID_ERROR_MEMORY;
 }
 
@@ -53,8 +54,10 @@ static ovoid_status set_terms(ov_refiner *r, ov_evaluation *e, const ov_points *
                               const double *x, size_t count) {
     for (size_t i = 0; i < count; ++i)
         ov_factor_quadric(x + i * OV_FACTOR_PARAMETERS, &r->quadrics[i]);
+    ov_followers_place(&r->followers, count, r->quadrics, r->listing[e->listing].skins);
     return ov_terms_set_skins(r->context, &e->terms, r->quadrics, r->listing[e->listing].skins,
-                              count, points->origin, ov_tuned.refine_cutoff);
+                              ov_followers_all(&r->followers, count), points->origin,
+                              ov_tuned.refine_cutoff);
 }
 
 /* Room for what the lists will be built for. */
@@ -63,7 +66,8 @@ static ovoid_status begin_listing(ov_refiner *r, size_t place, const ov_points *
     ovoid_status status = OVOID_OK;
     ov_listing *const l = &r->listing[place];
     const size_t size = count * OV_FACTOR_PARAMETERS;
-    OV_TRY(ov_grow(r->context, &l->skins, &l->skins_capacity, count, sizeof *l->skins, "skins"));
+    OV_TRY(ov_grow(r->context, &l->skins, &l->skins_capacity,
+                   ov_followers_all(&r->followers, count), sizeof *l->skins, "skins"));
     choose_skins(&r->listing[r->now.listing], points, x, count, l->skins);
     l->listed_count = 0; /* until the lists are whole again */
     OV_TRY(ov_grow(r->context, &l->listed, &l->listed_capacity, size, sizeof *x, "parameters"));
@@ -175,7 +179,7 @@ cleanup:
 /* *whole: what was begun had room; otherwise it has been done again, and what was launched since is
  * worth nothing. */
 static ovoid_status end_evaluation(ov_refiner *r, ov_evaluation *e, const ov_target *target,
-                                   bool begun, bool *whole, double *misfit) {
+                                   size_t count, bool begun, bool *whole, double *misfit) {
     ovoid_status status = OVOID_OK;
     ov_listing *const l = &r->listing[e->listing];
     *whole = true;
@@ -189,7 +193,7 @@ static ovoid_status end_evaluation(ov_refiner *r, ov_evaluation *e, const ov_tar
         OV_TRY(end_sums(r, target, misfit));
     }
     if (begun)
-        l->listed_count = e->terms.count;
+        l->listed_count = count;
     ++r->evaluations;
 cleanup:
     return status;
@@ -208,7 +212,7 @@ static ovoid_status evaluate(ov_refiner *r, ov_evaluation *e, const ov_target *t
     bool begun, whole;
     OV_TRY(begin_evaluation(r, e, target, x, count, &begun));
     OV_TRY(read_sums(r, e, target, false));
-    OV_TRY(end_evaluation(r, e, target, begun, &whole, misfit));
+    OV_TRY(end_evaluation(r, e, target, count, begun, &whole, misfit));
 cleanup:
     if (status != OVOID_OK)
         abandon(r);
@@ -257,8 +261,8 @@ static void take_step(const double *x, const double *step, size_t count, double 
 }
 
 static ovoid_status find_step(ov_refiner *r, const ov_target *target,
-                              const ov_refine_options *options, const double *x, double damping,
-                              bool fresh) {
+                              const ov_refine_options *options, const double *x, size_t count,
+                              double damping, bool fresh) {
     ovoid_status status = OVOID_OK;
     const ov_system system = {.points = target->points,
                               .terms = &r->now.terms,
@@ -266,10 +270,13 @@ static ovoid_status find_step(ov_refiner *r, const ov_target *target,
                               .weight = &r->now.active,
                               .moments = &r->moments,
                               .gram = &r->gram,
-                              .parameters = x};
+                              .parameters = x,
+                              .count = count,
+                              .followers = &r->followers};
     if (fresh) {
         OV_TRY(ov_moments(r->context, &r->operations, target->points, &r->now.terms, system.lists,
                           &r->now.u, &r->moments));
+        OV_TRY(ov_followers_fold(r->context, &r->followers, count, NULL, &r->moments));
         OV_TRY(ov_gram(r->context, &r->operations, target->points, &r->now.terms, system.lists,
                        &r->now.active, &r->gram));
     }
@@ -287,10 +294,10 @@ static ovoid_status find_first(ov_refiner *r, const ov_target *target,
     bool begun, whole;
     OV_TRY(begin_evaluation(r, &r->now, target, x, count, &begun));
     OV_TRY(read_sums(r, &r->now, target, true));
-    OV_TRY(find_step(r, target, options, x, options->damping, true));
-    OV_TRY(end_evaluation(r, &r->now, target, begun, &whole, misfit));
+    OV_TRY(find_step(r, target, options, x, count, options->damping, true));
+    OV_TRY(end_evaluation(r, &r->now, target, count, begun, &whole, misfit));
     if (!whole)
-        OV_TRY(find_step(r, target, options, x, options->damping, true));
+        OV_TRY(find_step(r, target, options, x, count, options->damping, true));
 cleanup:
     if (status != OVOID_OK)
         abandon(r);
@@ -310,7 +317,7 @@ ovoid_status ov_refine(ov_refiner *r, const ov_target *target, const ov_refine_o
     for (uint32_t n = 1; n <= options->steps && small < 2 && damping < ov_tuned.refine_damping_max;
          ++n) {
         if (n > 1)
-            OV_TRY(find_step(r, target, options, x, damping, fresh));
+            OV_TRY(find_step(r, target, options, x, count, damping, fresh));
         take_step(x, r->step, count, options->width_max, r->trial);
         status = evaluate(r, &r->tried, target, r->trial, count, &tried);
         if (status == OVOID_ERROR_NUMERIC) { /* too far out to be a model: as good as rejected */
@@ -380,6 +387,7 @@ void ov_refiner_destroy(ov_refiner *r) {
     destroy_listing(&r->listing[1]);
     ov_operations_destroy(&r->operations);
     ov_solver_destroy(&r->solver);
+    ov_followers_destroy(&r->followers);
     ov_kernel_destroy(&r->misfit);
     ov_buffer_destroy(&r->moments);
     ov_buffer_destroy(&r->gram);

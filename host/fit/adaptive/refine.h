@@ -43,13 +43,14 @@ typedef struct ov_refiner {
     ovoid_context *context;
     ov_operations operations;
     ov_solver solver;
+    ov_followers followers; /* of what is refined; none unless they are set */
     ov_kernel misfit;
     ov_evaluation now, tried; /* of the accepted parameters, and of a step from there */
     ov_listing listing[2];    /* those of the former, which the latter shares as long as they do */
     ov_buffer moments, gram;
     ov_quadric *quadrics;
     double *trial, *step;
-    size_t capacity;
+    size_t capacity, quadrics_capacity;
     float *host;
     size_t host_capacity;
     ov_later sums; /* the read of a misfit's sums, while it is under way */

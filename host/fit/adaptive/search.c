@@ -88,7 +88,7 @@ void ov_adaptive_quadrics(ov_adaptive *f, const ov_trial *t) {
 }
 
 size_t ov_adaptive_surround(ov_adaptive *f, size_t count) {
-    const size_t fixed = f->around.fixed_count - f->around.lagging;
+    const size_t fixed = f->around.fixed_count;
     const double floor = ov_tuned.refine_cutoff * f->options->isovalue;
     size_t all = count + fixed;
     if (fixed > 0)

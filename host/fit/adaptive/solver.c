@@ -9,12 +9,13 @@ static size_t groups_of(const ov_solver *s, size_t count) {
     return (count + s->group - 1) / s->group;
 }
 
-static ovoid_status prepare(ovoid_context *context, ov_solver *s, size_t count) {
+/* all: with the images. */
+static ovoid_status prepare(ovoid_context *context, ov_solver *s, size_t count, size_t all) {
     ovoid_status status = OVOID_OK;
     const size_t vector = count * OV_FACTOR_PARAMETERS * sizeof(cl_float);
     size_t groups;
     ov_device *device;
-    ov_buffer *const vectors[] = {&s->diagonal, &s->x, &s->r, &s->z, &s->p, &s->q, &s->polynomial};
+    ov_buffer *const vectors[] = {&s->diagonal, &s->x, &s->r, &s->z, &s->p, &s->q};
     ov_buffer *const sums[] = {&s->rz, &s->rz_next, &s->pq};
     OV_TRY(ov_device_get(context, &device));
     s->group = device->solve_group;
@@ -29,6 +30,8 @@ static ovoid_status prepare(ovoid_context *context, ov_solver *s, size_t count) 
     }
     for (size_t k = 0; k < sizeof vectors / sizeof *vectors; ++k)
         OV_TRY(ov_buffer_reserve(context, vectors[k], vector, "vectors of the solver"));
+    OV_TRY(ov_buffer_reserve(context, &s->polynomial, all * OV_MONOMIALS * sizeof(cl_float),
+                             "polynomials"));
     for (size_t k = 0; k < sizeof sums / sizeof *sums; ++k)
         OV_TRY(ov_buffer_reserve(context, sums[k], groups * sizeof(cl_float), "sums"));
     OV_TRY(ov_buffer_reserve(context, &s->limit, sizeof(cl_float), "limits"));
@@ -73,10 +76,12 @@ static ovoid_status multiply(const work *w) {
     ov_solver *const s = w->s;
     const ov_system *const system = w->system;
     w->operations->idle = &s->state;
+    OV_TRY(ov_followers_turn(w->context, system->followers, w->count, &s->state, &s->polynomial));
     OV_TRY(ov_field_polynomial(w->context, w->operations, system->points, system->terms,
                                system->lists, &s->polynomial, system->weight, &s->jacobian_p));
     OV_TRY(ov_moments(w->context, w->operations, system->points, system->terms, system->lists,
                       &s->jacobian_p, &s->moments));
+    OV_TRY(ov_followers_fold(w->context, system->followers, w->count, &s->state, &s->moments));
 cleanup:
     w->operations->idle = NULL;
     return status;
@@ -177,10 +182,10 @@ ovoid_status ov_solve(ovoid_context *context, ov_solver *s, ov_operations *opera
                       const ov_system *system, double lambda, uint32_t iterations, double tolerance,
                       double *step) {
     ovoid_status status = OVOID_OK;
-    const cl_uint count = (cl_uint)system->terms->count;
+    const cl_uint count = (cl_uint)system->count;
     const cl_float damping = (cl_float)lambda;
     const size_t size = count * (size_t)OV_FACTOR_PARAMETERS;
-    OV_TRY(prepare(context, s, count));
+    OV_TRY(prepare(context, s, count, system->terms->count));
     work w = {context,
               s,
               operations,

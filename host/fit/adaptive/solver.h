@@ -7,6 +7,7 @@
 #define OV_SOLVER_H
 
 #include "field/field.h"
+#include "fit/adaptive/images.h"
 #include "model/factor.h"
 
 typedef struct ov_solver {
@@ -25,13 +26,16 @@ typedef struct ov_solver {
 } ov_solver;
 
 /* The system: J from terms and lists, W = weight (floats at the points), the moments of W r, and
- * the gram of W. */
+ * the gram of W. Terms are `count` ellipsoids and their images, whose moments have been folded in;
+ * the gram is that of the ellipsoids alone, whose preconditioner it makes. */
 typedef struct ov_system {
     const ov_points *points;
     const ov_terms *terms;
     const ov_lists *lists;
     const ov_buffer *weight, *moments, *gram;
-    const double *parameters; /* OV_FACTOR_PARAMETERS per ellipsoid, those of the terms */
+    const double *parameters; /* OV_FACTOR_PARAMETERS per ellipsoid */
+    size_t count;
+    ov_followers *followers;
 } ov_system;
 
 /* step: OV_FACTOR_PARAMETERS per ellipsoid, the solution of (J^T W J + lambda D) step = -J^T W r

@@ -35,9 +35,8 @@ static double root_weight(const ov_target *target, double phi, double slope) {
     return (options->floor + exp(-delta * delta)) / (slope * length);
 }
 
-/* Where phi was set to 0, beyond a part, nothing of the part is to be, whatever else is there. */
 static double fixed_at(const ov_target *target, size_t k) {
-    return target->fixed && target->phi[k] > 0.0f ? target->fixed[k] : 0.0;
+    return target->fixed ? target->fixed[k] : 0.0;
 }
 
 static void set_bounds(ov_target *target, size_t k) {
@@ -148,20 +147,39 @@ cleanup:
     return status;
 }
 
-ovoid_status ov_target_fix(ovoid_context *context, ov_target *target, const ov_buffer *values) {
+/* Where phi was set to 0, beyond a part, nothing of the part is to be, whatever else is there, but
+ * for what is allowed (NULL: nothing). */
+static void guard_beyond(ov_target *target, const float *allowed) {
+    const size_t count = target->points->packs * OV_PACK;
+    for (size_t k = 0; k < count; ++k)
+        if (!(target->phi[k] > 0.0f))
+            target->fixed[k] = allowed ? -allowed[k] : 0.0f;
+}
+
+ovoid_status ov_target_fix(ovoid_context *context, ov_target *target, const ov_buffer *values,
+                           const ov_buffer *beyond) {
     ovoid_status status = OVOID_OK;
     const size_t count = target->points->packs * OV_PACK;
+    float *allowed = NULL;
     if (!target->fixed)
         target->fixed = ov_alloc(context, count, sizeof *target->fixed, "values at points");
     if (!target->fixed)
         return OVOID_ERROR_MEMORY;
     OV_TRY(ov_buffer_read(context, values, 0, target->fixed, count * sizeof *target->fixed));
+    if (beyond) {
+        allowed = ov_alloc(context, count, sizeof *allowed, "values at points");
+        if (!allowed)
+            return OVOID_ERROR_MEMORY;
+        OV_TRY(ov_buffer_read(context, beyond, 0, allowed, count * sizeof *allowed));
+    }
+    guard_beyond(target, allowed);
     for (size_t k = 0; k < count; ++k)
         if (!ov_points_fill(target->points, k))
             set_bounds(target, k);
     OV_TRY(ov_buffer_write(context, &target->low, 0, target->host_low, count * sizeof(float)));
     OV_TRY(ov_buffer_write(context, &target->high, 0, target->host_high, count * sizeof(float)));
 cleanup:
+    free(allowed);
     return status;
 }
 

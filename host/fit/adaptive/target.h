@@ -30,8 +30,8 @@ typedef struct ov_target {
     double decay, isovalue;
     float *slope; /* max(|grad phi|, floor) at each point: a residual over it is a distance */
     float *phi;
-    float *fixed; /* the field of what is not refined, at each point: the bounds are less by it.
-                     NULL: there is no such thing */
+    float *fixed; /* the field of what is not refined, at each point: the bounds are less by it,
+                     those beyond a part by what is not to count there. NULL: no such thing */
 } ov_target;
 
 void ov_target_options_init(ov_target_options *options);
@@ -42,8 +42,9 @@ ovoid_status ov_target_create(ovoid_context *context, const ov_samples *samples,
 void ov_target_destroy(ov_target *target);
 
 /* Lets `values` at the points, OV_PACK per pack, be the field of what is not refined from now on.
- */
-ovoid_status ov_target_fix(ovoid_context *context, ov_target *target, const ov_buffer *values);
+ * beyond: NULL, or what is allowed at guards beyond a part, above what is of any. */
+ovoid_status ov_target_fix(ovoid_context *context, ov_target *target, const ov_buffer *values,
+                           const ov_buffer *beyond);
 
 /* Makes room on the device for low, high and weight of so many packs. */
 ovoid_status ov_target_reserve(ovoid_context *context, ov_target *target, size_t packs);

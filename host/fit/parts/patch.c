@@ -109,17 +109,24 @@ static void patches_destroy(patches *all) {
 
 /* ---- what is fitted -------------------------------------------------------------------------- */
 
+/* Whether an ellipsoid has to do with a place that is off, however far its centre is from there. */
+static bool matters(const patches *all, const patch *one, const ov_quadric *placed) {
+    const double least = log(ov_tuned.grow_matters * all->parts->options->isovalue);
+    for (size_t n = 0; n < one->spots; ++n)
+        if (ov_quadric_log_value(placed, one->spot[n].at) >= least)
+            return true;
+    return false;
+}
+
 /* Marks what an image of the model has about the spots of a patch. Of an ellipsoid that is there in
- * several images, one is fitted: the others are where it was. */
+ * several images, one is fitted, and the others follow. */
 static void choose_in_image(const patches *all, const patch *one, size_t image, ov_chosen *chosen) {
     const ov_found *const model = &all->parts->model;
-    const ov_rigid *const motion = &all->parts->partition.image[image];
     for (size_t i = 0; i < model->count; ++i) {
-        const double *const at = model->quadrics[i].centre;
-        double moved[3] = {at[0], at[1], at[2]};
-        if (image > 0)
-            ov_rigid_move(motion, at, moved);
-        if (!chosen[i] && ov_spots_near(one->spot, one->spots, moved, all->reach))
+        ov_quadric placed;
+        ov_scene_place_term(all->parts, &model->quadrics[i], image, &placed);
+        if (!chosen[i] && (ov_spots_near(one->spot, one->spots, placed.centre, all->reach) ||
+                           matters(all, one, &placed)))
             chosen[i] = (ov_chosen)(image + 1);
     }
 }
@@ -265,8 +272,7 @@ static void forget(patch *one) {
     ov_found_destroy(&one->fit.found);
 }
 
-/* Whether the patch is as far off as it was, as can be where images of an ellipsoid meet at an
- * axis: each of them is refined as if the others stayed. */
+/* Whether the patch is as far off as it was. */
 static bool is_no_better(const ov_parts *parts, const patch *one) {
     const ovoid_fit_result *const result = &one->fit.result;
     double before = 0.0;
@@ -394,12 +400,13 @@ static void count_work(const patches *all, ovoid_fit_result *result) {
 
 static ovoid_status tell_touched(ovoid_context *context, const patches *all, ov_box **touched,
                                  size_t *count) {
-    *count = all->cut.count;
-    *touched = ov_alloc(context, *count, sizeof **touched, "patches");
+    *count = 0;
+    *touched = ov_alloc(context, all->cut.count, sizeof **touched, "patches");
     if (!*touched)
         return OVOID_ERROR_MEMORY;
-    for (size_t p = 0; p < *count; ++p)
-        (*touched)[p] = all->cut.part[p].box;
+    for (size_t p = 0; p < all->cut.count; ++p)
+        if (all->patch[p].fit.found.count > 0)
+            (*touched)[(*count)++] = all->cut.part[p].box;
     return OVOID_OK;
 }
 

@@ -85,14 +85,14 @@ static bool reaches(const ov_parts *parts, const ov_quadric *quadric, const ov_b
 }
 
 /* An image's ellipsoids that stand for atoms about a box (taken), and those that are felt there;
- * NULL or of all those that are chosen or not. */
+ * without those that are chosen. */
 static ovoid_status add_ellipsoids(ovoid_context *context, const ov_parts *parts, const ov_box *box,
                                    const ov_found *found, size_t image, const ov_chosen *chosen,
-                                   bool of_chosen, const bool *taken, ov_scene *s) {
+                                   const bool *taken, ov_scene *s) {
     ovoid_status status = OVOID_OK;
     for (size_t i = 0; i < found->count; ++i) {
         ov_quadric placed;
-        if (chosen && ((chosen[i] > 0) != of_chosen || chosen[i] == image + 1))
+        if (chosen && chosen[i] > 0)
             continue;
         ov_scene_place_term(parts, &found->quadrics[i], image, &placed);
         if (taken[i] || reaches(parts, &placed, box))
@@ -113,7 +113,7 @@ static ovoid_status add_done_part(ovoid_context *context, const ov_parts *parts,
         if (felt[n])
             taken[found->owner[n]] = true;
     const ovoid_status status =
-        add_ellipsoids(context, parts, box, found, of->image, NULL, false, taken, s);
+        add_ellipsoids(context, parts, box, found, of->image, NULL, taken, s);
     free(taken);
     return status;
 }
@@ -206,20 +206,7 @@ static ovoid_status add_image(ovoid_context *context, const ov_parts *parts, con
         if (meets(cut, box, q, image))
             OV_TRY(add_done(context, parts, box, q, image, chosen, taken, s));
     if (image == 0 || ov_scene_meets(parts, box, image))
-        OV_TRY(add_ellipsoids(context, parts, box, &parts->model, image, chosen, false, taken, s));
-cleanup:
-    return status;
-}
-
-/* What is chosen where it is not fitted, but follows. */
-static ovoid_status add_lagging(ovoid_context *context, const ov_parts *parts, const ov_box *box,
-                                const ov_chosen *chosen, bool *taken, ov_scene *s) {
-    ovoid_status status = OVOID_OK;
-    const size_t before = s->model_count;
-    memset(taken, 0, parts->model.count * sizeof *taken);
-    for (size_t g = 0; g < parts->partition.images; ++g)
-        OV_TRY(add_ellipsoids(context, parts, box, &parts->model, g, chosen, true, taken, s));
-    s->lagging = s->model_count - before;
+        OV_TRY(add_ellipsoids(context, parts, box, &parts->model, image, chosen, taken, s));
 cleanup:
     return status;
 }
@@ -232,8 +219,6 @@ ovoid_status ov_scene_about(ovoid_context *context, const ov_parts *parts, const
         return OVOID_ERROR_MEMORY;
     for (size_t g = 0; g < parts->partition.images; ++g)
         OV_TRY(add_image(context, parts, box, g, chosen, taken, scene));
-    if (chosen && parts->partition.images > 1)
-        OV_TRY(add_lagging(context, parts, box, chosen, taken, scene));
 cleanup:
     free(taken);
     return status;
@@ -251,7 +236,6 @@ ov_surroundings ov_scene_surround(const ov_parts *parts, const ov_scene *scene, 
     return (ov_surroundings){.atoms = scene->atoms - own,
                              .fixed = scene->model,
                              .fixed_count = scene->model_count,
-                             .lagging = scene->lagging,
                              .region = ov_box_larger(box, parts->margin),
                              .done = done,
                              .total = parts->partition.count};

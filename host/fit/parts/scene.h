@@ -12,7 +12,6 @@ typedef struct ov_scene {
     ov_quadric *model; /* ellipsoids, and the Gaussians of atoms of parts that are not done; none of
                           the part's own */
     size_t atoms, atoms_capacity, image_capacity, model_count, model_capacity;
-    size_t lagging; /* the last so many of the model are images of what is chosen */
 } ov_scene;
 
 /* Part p among its neighbours, of which those of earlier colours are in the model as their
@@ -24,8 +23,7 @@ ovoid_status ov_scene_of_part(ovoid_context *context, const ov_parts *parts, siz
 typedef uint32_t ov_chosen;
 
 /* What is about a box when all parts are done, without the ellipsoids of the model that are chosen,
- * in the image in which they are, and their atoms there; in other images these come last. NULL:
- * with all. */
+ * in any image, and their atoms in the image in which they are. NULL: with all. */
 ovoid_status ov_scene_about(ovoid_context *context, const ov_parts *parts, const ov_box *box,
                             const ov_chosen *chosen, ov_scene *scene);
 

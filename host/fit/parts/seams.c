@@ -118,17 +118,21 @@ static bool is_better(const job *j, const mended *before) {
            (now->spots == before->spots && now->deviation < before->deviation);
 }
 
-/* Fits patches about what is off, and surveys what that touched. Where so many ellipsoids did not
- * help, others may have one to spare: patches become larger from round to round. */
-static ovoid_status mend(ovoid_context *context, job *j, uint32_t round, ovoid_fit_result *result) {
+/* Fits patches about what is off, and surveys what that touched, if it did anything. Where so many
+ * ellipsoids did not help, others may have one to spare: patches become larger from round to round.
+ */
+static ovoid_status mend(ovoid_context *context, job *j, uint32_t round, ovoid_fit_result *result,
+                         bool *changed) {
     ovoid_status status = OVOID_OK;
     ov_box *touched = NULL;
     size_t count = 0;
     const double wider = j->parts->ellipsoids ? pow(ov_tuned.patch_wider, round) : 1.0;
     OV_TRY(ov_patches_mend(context, j->parts, wider * ov_tuned.patch_reach, j->total->spot,
                            j->total->spots, &touched, &count, result));
+    *changed = count > 0;
     choose_touched(j, touched, count);
-    OV_TRY(survey(context, j));
+    if (*changed)
+        OV_TRY(survey(context, j));
 cleanup:
     free(touched);
     return status;
@@ -156,17 +160,23 @@ static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *r
     mended best = {0};
     const bool by_number = j->parts->ellipsoids;
     const uint32_t rounds = by_number ? ov_tuned.patch_rounds : ov_tuned.part_mends;
-    uint32_t n = 0;
+    uint32_t n = 0, idle = 0;
+    bool changed = true;
     choose_all(j);
     OV_TRY(survey(context, j));
     for (; n < rounds && j->total->spots > 0; ++n) {
-        if (n > 0 && !is_better(j, &best)) {
-            if (!by_number)
-                break;
+        if (n == 0 || is_better(j, &best)) {
+            OV_TRY(keep(context, j, &best));
+            idle = 0;
+        } else if (by_number) {
             OV_TRY(go_back(context, j, &best, true));
+            OV_TRY(keep(context, j, &best));
+        } else if (++idle == ov_tuned.part_mends_idle) {
+            break;
         }
-        OV_TRY(keep(context, j, &best));
-        OV_TRY(mend(context, j, n, result));
+        OV_TRY(mend(context, j, n, result, &changed));
+        if (!changed && !by_number) /* it would not the next time either */
+            break;
     }
     if (n > 0 && !is_better(j, &best)) {
         const double deviation = best.deviation;

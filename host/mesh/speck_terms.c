@@ -20,6 +20,8 @@ static const double between[] = {0.5, 0.3, 0.7, 0.15, 0.85};
 #define HALF_SHARE 0.5
 #define HALF_STEPS 3.0
 
+#define LOG_2 0.6931471805599453
+
 #define CELL_BITS 20 /* cells per axis of the grid over candidates, as a power of two */
 #define CELL_STEPS 4.0
 
@@ -38,12 +40,16 @@ typedef struct grid {
     size_t count;
     uint32_t *term; /* in the order of their cells */
     uint64_t *key;
+    uint32_t *row;    /* where the row of cells y + z size[1] begins, and where the last one ends;
+                         NULL: there would be too many */
+    uint64_t size[3]; /* cells that there are candidates in, at most */
     double low[3], cell;
 } grid;
 
 static void grid_destroy(grid *g) {
     free(g->term);
     free(g->key);
+    free(g->row);
 }
 
 static uint64_t cell_at(const grid *g, int axis, double x) {
@@ -69,6 +75,36 @@ static void lay_grid(const ov_body *bodies, const uint32_t *term, size_t count, 
         extent = fmax(extent, high - low);
     }
     g->cell = fmax(CELL_STEPS * spacing, extent / (double)((1u << CELL_BITS) - 1));
+    for (int axis = 0; axis < 3; ++axis)
+        g->size[axis] = 0;
+}
+
+static void widen(grid *g, uint64_t key) {
+    const uint64_t mask = (1u << CELL_BITS) - 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        const uint64_t at = key >> (CELL_BITS * axis) & mask;
+        g->size[axis] = g->size[axis] > at + 1 ? g->size[axis] : at + 1;
+    }
+}
+
+/* So many rows at most for each candidate: else those that have any are searched for. */
+#define ROWS_MOST 8
+
+static ovoid_status find_rows(ovoid_context *context, grid *g) {
+    const uint64_t rows = g->size[1] * g->size[2];
+    if (rows > ROWS_MOST * (uint64_t)g->count)
+        return OVOID_OK;
+    g->row = ov_alloc(context, (size_t)rows + 1, sizeof *g->row, "small terms");
+    if (!g->row)
+        return OVOID_ERROR_MEMORY;
+    size_t k = 0;
+    for (uint64_t r = 0; r <= rows; ++r) {
+        const uint64_t first = key_of(0, r % g->size[1], r / g->size[1]);
+        while (k < g->count && g->key[k] < first)
+            ++k;
+        g->row[r] = (uint32_t)k;
+    }
+    return OVOID_OK;
 }
 
 static ovoid_status grid_create(ovoid_context *context, const ov_body *bodies, const uint32_t *term,
@@ -87,12 +123,14 @@ static ovoid_status grid_create(ovoid_context *context, const ov_body *bodies, c
     for (size_t k = 0; k < count; ++k) {
         const double *const at = bodies[term[k]].quadric.centre;
         keys[k] = key_of(cell_at(g, 0, at[0]), cell_at(g, 1, at[1]), cell_at(g, 2, at[2]));
+        widen(g, keys[k]);
     }
     OV_TRY(ov_sort_keys(context, keys, count, order));
     for (size_t k = 0; k < count; ++k) {
         g->term[k] = term[order[k]];
         g->key[k] = keys[order[k]];
     }
+    OV_TRY(find_rows(context, g));
 cleanup:
     free(keys);
     free(order);
@@ -120,16 +158,21 @@ static void visit_box(const grid *g, const double centre[3], const double half[3
     for (int axis = 0; axis < 3; ++axis) {
         from[axis] = cell_at(g, axis, centre[axis] - half[axis]);
         to[axis] = cell_at(g, axis, centre[axis] + half[axis]);
+        to[axis] = to[axis] < g->size[axis] ? to[axis] : g->size[axis] - 1;
+        if (from[axis] > to[axis])
+            return;
     }
     if ((to[1] - from[1] + 1) * (to[2] - from[2] + 1) > g->count) {
         for (size_t k = 0; k < g->count; ++k)
             visit(k, user);
         return;
     }
-    size_t k = ov_first_key(g->key, g->count, key_of(from[0], from[1], from[2]));
+    size_t k = g->row ? 0 : ov_first_key(g->key, g->count, key_of(from[0], from[1], from[2]));
     for (uint64_t z = from[2]; z <= to[2]; ++z)
         for (uint64_t y = from[1]; y <= to[1]; ++y) {
             const uint64_t last = key_of(to[0], y, z);
+            if (g->row)
+                k = g->row[z * g->size[1] + y];
             for (k = first_from(g, k, key_of(from[0], y, z)); k < g->count && g->key[k] <= last;
                  ++k)
                 visit(k, user);
@@ -143,17 +186,27 @@ typedef struct finder {
     size_t count;
     double isovalue, cutoff, spacing;
     grid candidates;
-    uint32_t *group;    /* of all bodies: one of its group, itself in the end */
-    bool *plain;        /* of all bodies, true for groups too large for specks */
+    double *log_amplitude; /* of all bodies, over the isovalue, */
+    double *ball;          /* and the radius of the ball inside the surface that they have by
+                              themselves, negative where there is none */
+    uint32_t *group;       /* of all bodies: one of its group, itself in the end */
+    bool *plain;           /* of all bodies, true for groups too large for specks */
     size_t body;        /* the one that is looking */
     double half_max[3]; /* of all candidates' boxes */
     size_t *start;      /* of the k-th of the grid */
     uint32_t *near_it;  /* NULL while they are counted */
 } finder;
 
-/* Radius of the ball inside a term's own surface, negative where it has none. */
-static double ball_of(const finder *f, size_t i) {
-    return ov_body_reach(&f->bodies[i], f->isovalue) * f->bodies[i].least;
+static void look_at_bodies(finder *f) {
+    for (size_t i = 0; i < f->count; ++i) {
+        const ov_body *const body = &f->bodies[i];
+        f->log_amplitude[i] = log(body->quadric.amplitude / f->isovalue);
+        f->ball[i] = ov_body_reach(body, f->isovalue) * body->least;
+    }
+}
+
+static bool is_large(const finder *f, size_t i) {
+    return !(f->ball[i] < BALL_STEPS * f->spacing);
 }
 
 static uint32_t group_of(const finder *f, uint32_t i) {
@@ -164,13 +217,27 @@ static uint32_t group_of(const finder *f, uint32_t i) {
     return i;
 }
 
-/* Whether the field of the two alone reaches the isovalue all along from centre to centre. */
-static bool are_linked(const finder *f, const ov_quadric *a, const ov_quadric *b) {
+/* The exponent of a term at so many times a step away from its centre. */
+static double exponent(const ov_quadric *quadric, const double step[3], double times) {
+    const double *const a = quadric->a;
+    const double x = times * step[0], y = times * step[1], z = times * step[2];
+    return a[0] * x * x + a[3] * y * y + a[5] * z * z +
+           2.0 * (a[1] * x * y + a[2] * x * z + a[4] * y * z);
+}
+
+/* Whether the field of the two alone reaches the isovalue all along from centre to centre. The
+ * larger one tells alone where it reaches that by itself, or not even a half of it. */
+static bool are_linked(const finder *f, size_t i, size_t j) {
+    const ov_quadric *const a = &f->bodies[i].quadric, *const b = &f->bodies[j].quadric;
+    double step[3];
+    for (int axis = 0; axis < 3; ++axis)
+        step[axis] = b->centre[axis] - a->centre[axis];
     for (size_t k = 0; k < sizeof between / sizeof *between; ++k) {
-        double at[3];
-        for (int axis = 0; axis < 3; ++axis)
-            at[axis] = a->centre[axis] + between[k] * (b->centre[axis] - a->centre[axis]);
-        if (exp(ov_quadric_log_value(a, at)) + exp(ov_quadric_log_value(b, at)) < f->isovalue)
+        const double p = f->log_amplitude[i] - exponent(a, step, between[k]),
+                     q = f->log_amplitude[j] - exponent(b, step, 1.0 - between[k]);
+        if (fmax(p, q) >= 0.0)
+            continue;
+        if (fmax(p, q) < -LOG_2 || exp(p) + exp(q) < 1.0)
             return false;
     }
     return true;
@@ -181,10 +248,9 @@ static void link_bodies(size_t position, void *user) {
     finder *const f = user;
     const uint32_t candidate = f->candidates.term[position];
     uint32_t a = group_of(f, (uint32_t)f->body), b = group_of(f, candidate);
-    if (a == b || (f->plain[a] && f->plain[b]) ||
-        !are_linked(f, &f->bodies[f->body].quadric, &f->bodies[candidate].quadric))
+    if (a == b || (f->plain[a] && f->plain[b]) || !are_linked(f, f->body, candidate))
         return;
-    const double p = ball_of(f, a), q = ball_of(f, b);
+    const double p = f->ball[a], q = f->ball[b];
     if (q > p || (q == p && b < a)) {
         const uint32_t swap = a;
         a = b;
@@ -202,7 +268,17 @@ static bool link_half(const finder *f, const ov_body *body, double half[3]) {
     return ov_body_reach(body, f->isovalue) >= 0.0;
 }
 
-static void find_groups(finder *f) {
+/* A candidate that joins what is too large for specks is of no speck: what it joins is not either,
+ * whatever the group is. */
+static void join_plain(size_t position, void *user) {
+    finder *const f = user;
+    const uint32_t candidate = f->candidates.term[position];
+    if (!f->plain[candidate])
+        f->plain[candidate] = are_linked(f, f->body, candidate);
+}
+
+/* Visits the candidates about the bodies that are large, or about the others. */
+static void visit_linked(finder *f, bool large, visit_fn *visit) {
     double half[3], most[3] = {0};
     for (size_t k = 0; k < f->candidates.count; ++k)
         if (link_half(f, &f->bodies[f->candidates.term[k]], half))
@@ -210,11 +286,11 @@ static void find_groups(finder *f) {
                 most[axis] = fmax(most[axis], half[axis]);
     for (f->body = 0; f->body < f->count; ++f->body) {
         const ov_body *const body = &f->bodies[f->body];
-        if (!link_half(f, body, half))
+        if (is_large(f, f->body) != large || !link_half(f, body, half))
             continue;
         for (int axis = 0; axis < 3; ++axis)
             half[axis] += most[axis];
-        visit_box(&f->candidates, body->quadric.centre, half, link_bodies, f);
+        visit_box(&f->candidates, body->quadric.centre, half, visit, f);
     }
 }
 
@@ -233,8 +309,7 @@ static void drop_long_groups(finder *f) {
 static size_t list_candidates(const finder *f, uint32_t *term) {
     size_t count = 0;
     for (size_t i = 0; i < f->count; ++i) {
-        const double ball = ball_of(f, i);
-        if (!(ball > 0.0 && ball < BALL_STEPS * f->spacing))
+        if (!(f->ball[i] > 0.0) || is_large(f, i))
             continue;
         if (term)
             term[count] = (uint32_t)i;
@@ -321,6 +396,21 @@ static ovoid_status keep_groups(ovoid_context *context, finder *f) {
     return OVOID_OK;
 }
 
+/* Most candidates, such as hydrogens, join something large, and are left out before the others are
+ * looked at two by two. */
+static ovoid_status find_groups(ovoid_context *context, finder *f) {
+    ovoid_status status = OVOID_OK;
+    visit_linked(f, true, join_plain);
+    OV_TRY(keep_groups(context, f));
+    if (f->candidates.count == 0)
+        goto cleanup;
+    visit_linked(f, false, link_bodies);
+    drop_long_groups(f);
+    OV_TRY(keep_groups(context, f));
+cleanup:
+    return status;
+}
+
 /* The candidates that are left, largest first. */
 typedef struct sized {
     double ball;
@@ -349,7 +439,7 @@ static ovoid_status hand_over(ovoid_context *context, finder *f, ov_speck_terms 
         return OVOID_ERROR_MEMORY;
     }
     for (size_t k = 0; k < count; ++k)
-        order[k] = (sized){ball_of(f, f->candidates.term[k]), k, f->candidates.term[k]};
+        order[k] = (sized){f->ball[f->candidates.term[k]], k, f->candidates.term[k]};
     qsort(order, count, sizeof *order, by_size);
     for (size_t k = 0; k < count; ++k) {
         const size_t first = f->start[order[k].position],
@@ -373,9 +463,16 @@ ovoid_status ov_speck_terms_find(ovoid_context *context, const ov_body *bodies, 
                 .spacing = spacing};
     uint32_t *term = NULL;
     *terms = (ov_speck_terms){0};
+    f.log_amplitude = ov_alloc(context, count, sizeof *f.log_amplitude, "small terms");
+    f.ball = ov_alloc(context, count, sizeof *f.ball, "small terms");
+    if (!f.log_amplitude || !f.ball) {
+        status = OVOID_ERROR_MEMORY;
+        goto cleanup;
+    }
+    look_at_bodies(&f);
     const size_t candidates = list_candidates(&f, NULL);
     if (candidates == 0)
-        return OVOID_OK;
+        goto cleanup;
     term = ov_alloc(context, candidates, sizeof *term, "small terms");
     f.group = ov_alloc(context, count, sizeof *f.group, "small terms");
     f.plain = ov_alloc(context, count, sizeof *f.plain, "small terms");
@@ -386,18 +483,18 @@ ovoid_status ov_speck_terms_find(ovoid_context *context, const ov_body *bodies, 
     list_candidates(&f, term);
     for (size_t i = 0; i < count; ++i) {
         f.group[i] = (uint32_t)i;
-        f.plain[i] = !(ball_of(&f, i) < BALL_STEPS * spacing);
+        f.plain[i] = is_large(&f, i);
     }
     OV_TRY(grid_create(context, bodies, term, candidates, spacing, &f.candidates));
-    find_groups(&f);
-    drop_long_groups(&f);
-    OV_TRY(keep_groups(context, &f));
+    OV_TRY(find_groups(context, &f));
     if (f.candidates.count == 0)
         goto cleanup;
     OV_TRY(find_near(context, &f));
     OV_TRY(hand_over(context, &f, terms));
 cleanup:
     free(term);
+    free(f.log_amplitude);
+    free(f.ball);
     free(f.group);
     free(f.plain);
     free(f.start);

@@ -184,12 +184,12 @@ static void groups_are_those_of_all_pairs(void **state) {
                 xyzr[4 * i + axis] = random_uniform(&random, -half, half);
             if (n >= 3) /* along an axis */
                 xyzr[4 * i + (size_t)n - 3] *= 300.0;
-            xyzr[4 * i + 3] = i % 9 == 0 ? random_uniform(&random, 1.2, 1.8)
-                                         : random_uniform(&random, 0.0, 1.1);
+            xyzr[4 * i + 3] =
+                i % 9 == 0 ? random_uniform(&random, 1.2, 1.8) : random_uniform(&random, 0.0, 1.1);
             ov_body_of_atom(xyzr + 4 * i, 0.5, &bodies[i]);
         }
-        test_check(*state, ov_speck_terms_find(*state, bodies, count, ISOVALUE, CUTOFF, SPACING,
-                                               &terms));
+        test_check(*state,
+                   ov_speck_terms_find(*state, bodies, count, ISOVALUE, CUTOFF, SPACING, &terms));
         expect_all_pairs(bodies, count, &terms);
         ov_speck_terms_destroy(&terms);
     }

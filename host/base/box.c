@@ -2,6 +2,15 @@
 
 #include <math.h>
 
+const ov_box ov_box_empty = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+void ov_box_add(ov_box *box, const double at[3], double about) {
+    for (size_t k = 0; k < 3; ++k) {
+        box->low[k] = fmin(box->low[k], at[k] - about);
+        box->high[k] = fmax(box->high[k], at[k] + about);
+    }
+}
+
 bool ov_boxes_near(const ov_box *a, const ov_box *b, double distance) {
     for (size_t k = 0; k < 3; ++k)
         if (a->low[k] - distance > b->high[k] || b->low[k] - distance > a->high[k])

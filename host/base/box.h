@@ -10,6 +10,12 @@ typedef struct ov_box {
     double low[3], high[3]; /* angstrom */
 } ov_box;
 
+/* A box with nothing in it, for what is added. */
+extern const ov_box ov_box_empty;
+
+/* Makes a box so large that a point is in it, and all within `about` of that along the axes. */
+void ov_box_add(ov_box *box, const double at[3], double about);
+
 /* Whether two boxes are no further apart than that along each axis, angstrom. */
 bool ov_boxes_near(const ov_box *a, const ov_box *b, double distance);
 

@@ -105,17 +105,11 @@ ovoid_status ov_judge_remember(ov_judge *judge, const ov_quadric *quadrics, size
     ovoid_status status = OVOID_OK;
     ov_seen *const seen = &judge->seen;
     seen->hidden_count = 0;
-    for (size_t k = 0; k < 3; ++k) {
-        seen->box.low[k] = INFINITY;
-        seen->box.high[k] = -INFINITY;
-    }
+    seen->box = ov_box_empty;
     for (size_t v = 0; v < mesh->vertices; ++v) {
         double at[3];
         ov_mesh_at(mesh, v, at);
-        for (size_t k = 0; k < 3; ++k) {
-            seen->box.low[k] = fmin(seen->box.low[k], at[k]);
-            seen->box.high[k] = fmax(seen->box.high[k], at[k]);
-        }
+        ov_box_add(&seen->box, at, 0.0);
         if (!ov_mesh_is_exposed(mesh, v))
             OV_TRY(ov_seen_hide(judge->context, seen, at));
     }

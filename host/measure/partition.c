@@ -9,15 +9,9 @@
 /* ---- cutting --------------------------------------------------------------------------------- */
 
 static void bound(const double *xyzr, const uint32_t *order, ov_part *part) {
-    for (size_t k = 0; k < 3; ++k) {
-        part->box.low[k] = INFINITY;
-        part->box.high[k] = -INFINITY;
-    }
+    part->box = ov_box_empty;
     for (size_t n = part->first; n < part->first + part->count; ++n)
-        for (size_t k = 0; k < 3; ++k) {
-            part->box.low[k] = fmin(part->box.low[k], xyzr[4 * (size_t)order[n] + k]);
-            part->box.high[k] = fmax(part->box.high[k], xyzr[4 * (size_t)order[n] + k]);
-        }
+        ov_box_add(&part->box, xyzr + 4 * (size_t)order[n], 0.0);
 }
 
 static size_t longest_axis(const ov_part *part) {

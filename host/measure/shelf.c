@@ -38,10 +38,7 @@ static ovoid_status bound_parts(ovoid_context *context, ov_shelf *shelf) {
         return OVOID_ERROR_MEMORY;
     for (size_t p = 0; p < cut->count; ++p) {
         ov_box *const box = &shelf->reach[p];
-        for (size_t k = 0; k < 3; ++k) {
-            box->low[k] = INFINITY;
-            box->high[k] = -INFINITY;
-        }
+        *box = ov_box_empty;
         for (size_t n = cut->part[p].first; n < cut->part[p].first + cut->part[p].count; ++n) {
             ov_body body;
             ov_body_of_field(shelf->field, cut->order[n], &body);
@@ -92,7 +89,7 @@ static bool meets(const ov_box *own, const ov_rigid *motion, const ov_box *box) 
 
 static bool reaches(const ov_shelf *shelf, size_t term, const ov_rigid *motion, const ov_box *box) {
     ov_body body;
-    ov_box own = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    ov_box own = ov_box_empty;
     ov_body_of_field(shelf->field, term, &body);
     widen(&body, shelf->least, &own);
     return own.low[0] <= own.high[0] && meets(&own, motion, box);

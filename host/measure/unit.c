@@ -29,13 +29,6 @@ typedef struct finder {
     ov_unit_ends ends;
 } finder;
 
-static void include(const double at[3], double about, ov_box *box) {
-    for (size_t k = 0; k < 3; ++k) {
-        box->low[k] = fmin(box->low[k], at[k] - about);
-        box->high[k] = fmax(box->high[k], at[k] + about);
-    }
-}
-
 /* Finds the image with the atom nearest to a place, and the place as it lies to the unit from
  * there; how far it is from it, INFINITY: further than the grid reaches. */
 static double find_nearest(const finder *f, int grid, const double place[3], double nearest[3]) {
@@ -70,7 +63,7 @@ static void add_place(finder *f, const double place[3]) {
         return;
     }
     f->ends.nearest = fmax(f->ends.nearest, off + within[NEAR]);
-    include(nearest, within[NEAR], &f->ends.box);
+    ov_box_add(&f->ends.box, nearest, within[NEAR]);
 }
 
 /* Where an ellipsoid is: its middle, and all about it, so far out that it counts. */
@@ -120,12 +113,12 @@ ovoid_status ov_unit_find_ends(ovoid_context *context, const ovoid_field *origin
                 .back = back,
                 .images = images,
                 .level = SHARE * isovalue,
-                .box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}};
+                .box = ov_box_empty};
     for (size_t n = 0; n < GRIDS; ++n)
         OV_TRY(
             ov_grid_of(context, f.atoms->centre, sizeof *f.atoms, f.count, within[n], &f.grid[n]));
     for (size_t i = 0; i < f.count; ++i)
-        include(f.atoms[i].centre, 0.0, &f.box);
+        ov_box_add(&f.box, f.atoms[i].centre, 0.0);
     f.ends.box = f.box;
     f.ends.nearest = 2.0 * within[NEAR];
     for (size_t k = 0; k < 3; ++k) {

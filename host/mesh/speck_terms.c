@@ -191,10 +191,10 @@ typedef struct finder {
                               themselves, negative where there is none */
     uint32_t *group;       /* of all bodies: one of its group, itself in the end */
     bool *plain;           /* of all bodies, true for groups too large for specks */
-    size_t body;        /* the one that is looking */
-    double half_max[3]; /* of all candidates' boxes */
-    size_t *start;      /* of the k-th of the grid */
-    uint32_t *near_it;  /* NULL while they are counted */
+    size_t body;           /* the one that is looking */
+    double half_max[3];    /* of all candidates' boxes */
+    size_t *start;         /* of the k-th of the grid */
+    uint32_t *near_it;     /* NULL while they are counted */
 } finder;
 
 static void look_at_bodies(finder *f) {

@@ -38,13 +38,6 @@ static double distance(const double a[3], const double b[3]) {
     return sqrt(x * x + y * y + z * z);
 }
 
-static void grow_box(ov_box *box, const double at[3], double by) {
-    for (size_t k = 0; k < 3; ++k) {
-        box->low[k] = fmin(box->low[k], at[k] - by);
-        box->high[k] = fmax(box->high[k], at[k] + by);
-    }
-}
-
 /* Spots that are in each other's reach are of one patch: of[n] is the first of them. */
 static void unite_spots(const ov_spot *spots, size_t count, double apart, uint32_t *of) {
     for (size_t n = 0; n < count; ++n)
@@ -62,11 +55,11 @@ static ovoid_status fill_patch(ovoid_context *context, patches *all, const ov_sp
     one->spot = ov_alloc(context, count, sizeof *one->spot, "spots");
     if (!one->spot)
         return OVOID_ERROR_MEMORY;
-    part->box = (ov_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    part->box = ov_box_empty;
     for (size_t n = 0; n < count; ++n)
         if (of[n] == which) {
             one->spot[one->spots++] = spots[n];
-            grow_box(&part->box, spots[n].at, all->reach);
+            ov_box_add(&part->box, spots[n].at, all->reach);
         }
     return OVOID_OK;
 }
@@ -200,14 +193,14 @@ static ovoid_status fit_patch(ovoid_context *context, const patches *all, patch 
     ovoid_status status = OVOID_OK;
     const ov_parts *const parts = all->parts;
     ovoid_fit_options options = ov_part_options(parts, one->ellipsoids);
-    ov_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    ov_box box = ov_box_empty;
     ov_scene scene = {0};
     ov_rigid *images = NULL;
     ov_adaptive *adaptive = NULL;
     for (size_t n = 0; n < one->atoms; ++n) {
         double atom[4];
         ov_scene_place_atom(parts, parts->xyzr + 4 * (size_t)one->atom[n], one->image[n], atom);
-        grow_box(&box, atom, 0.0);
+        ov_box_add(&box, atom, 0.0);
         OV_TRY(ov_scene_add_atom(context, atom, 0, &scene));
     }
     OV_TRY(ov_scene_about(context, parts, &box, chosen, &scene));

@@ -59,7 +59,7 @@ host/measure/excerpt.c|near|nothing that leaves the box is hidden|s/(seen->hidde
 host/measure/excerpt.c|near|all that leaves the region is outer|s/region->hidden\[nearest\] ? -1 : 1/1/
 host/measure/excerpt.c|near|what is open is told by its volume|s/component_of\[v\]\] = true;/component_of[v]] = false;/
 host/measure/excerpt.c|near|points outside the box are none|s/within = asked->box;/within = \&(ov_box){{1e9, 1e9, 1e9}, {1e9, 1e9, 1e9}};/
-host/mesh/march.c|clip|a clipped mesh is closed|s/m->clipped \&\& axis < 3/false \&\& axis < 3/
+host/mesh/march_piece.c|clip|a clipped mesh is closed|s/m->clipped \&\& axis < 3/false \&\& axis < 3/
 host/measure/near.c|near|spots elsewhere are forgotten|s/if (!is_in_any(n, seen->spots.spot\[k\].at))/if (!is_in_any(n, seen->spots.spot[k].at) \&\& false)/
 host/measure/judge.c|+near|none near changes are none|s/(\*spot_count == 0 \&\& !near_will_do)/(near_will_do \&\& false)/
 host/mesh/components.c|mesh|walls of cavities are outer|s/mesh->component\[c\].outer = mesh->component\[c\].volume > 0.0;/mesh->component[c].outer = true;/

@@ -122,8 +122,12 @@ ovoid_status ov_facets_load(ovoid_context *context, ov_facets *facets, bool coar
     OV_TRY(OV_LAUNCH(context, &facets->pack, leaves, ov_item_group(device), OV_ARG(leaves),
                      OV_ARG(triangles), OV_ARG(begin), OV_ARG(stride), OV_ARG(corners), OV_ARG(xyz),
                      OV_ARG(facets->packed.memory), OV_ARG(facets->leaf_boxes.memory)));
-    if (!coarse && end - first == facets->leaves) /* nobody asks for them again */
+    if (!coarse && end - first == facets->leaves) { /* nobody asks for them again */
         ov_buffer_destroy(&facets->corners);
+        free(facets->listed);
+        facets->listed = NULL;
+        facets->listed_capacity = 0;
+    }
     facets->first = first;
     facets->end = end;
     facets->coarse = coarse;

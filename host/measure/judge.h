@@ -46,7 +46,7 @@ typedef struct ov_seen {
 typedef struct ov_region {
     ov_trail own, about; /* what is in the region; and about it, as far as `room` */
     double room;         /* angstrom; 0: nothing is known yet */
-    double *outside;     /* owned: 3 * outside_count, the vertices about it but not in it, */
+    double *outside;     /* owned: 3 * outside_count, vertices about it but not in it, */
     bool *hidden;        /* owned: and which of them are of no outer surface */
     size_t outside_count;
     ov_grid grid; /* of them */

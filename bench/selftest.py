@@ -59,6 +59,8 @@ CHANGES = [
      "beta = before > 0.0f ? 0.9f * after / before : 0.0f;"),
     ("solve_step", "solve.cl", "const float beta = before > 0.0f ? after / before : 0.0f;",
      "const float beta = before > 0.0f ? 0.9f * after / before : 0.0f;"),
+    ("turn_polynomials", "images.cl", "turned[5] *= 2.0f;", "turned[5] *= 2.002f;"),
+    ("fold_moments", "images.cl", "sum[k] += back[k];", "sum[k] += 1.001f * back[k];"),
     ("march_signs", "march.cl", "(vload16(k, value) > isovalue)", "(vload16(k, value) > 1.05f * isovalue)"),
     ("march_count", "march.cl", "crossing[brick] = (uint4)(0, x, y, z);",
      "crossing[brick] = (uint4)(0, x, y, z & 0x7fff);"),

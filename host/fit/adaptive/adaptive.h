@@ -30,7 +30,7 @@ typedef struct ov_surroundings {
         *fixed; /* what stands for these in the model: their Gaussians, or ellipsoids */
     size_t fixed_count;
     /* Of the unit of a symmetric assembly: what carries it to its images. Those of what is fitted
-     * follow it. */
+     * follow it: of a start, which there is then. */
     const ov_rigid *image;
     size_t images;
     ov_box region; /* in which surfaces are held to one another */

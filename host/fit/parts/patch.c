@@ -117,9 +117,11 @@ static void choose_in_image(const patches *all, const patch *one, size_t image, 
     const ov_found *const model = &all->parts->model;
     for (size_t i = 0; i < model->count; ++i) {
         ov_quadric placed;
+        if (chosen[i])
+            continue;
         ov_scene_place_term(all->parts, &model->quadrics[i], image, &placed);
-        if (!chosen[i] && (ov_spots_near(one->spot, one->spots, placed.centre, all->reach) ||
-                           matters(all, one, &placed)))
+        if (ov_spots_near(one->spot, one->spots, placed.centre, all->reach) ||
+            matters(all, one, &placed))
             chosen[i] = (ov_chosen)(image + 1);
     }
 }

@@ -161,24 +161,25 @@ static ovoid_status mend_all(ovoid_context *context, job *j, ovoid_fit_result *r
     const bool by_number = j->parts->ellipsoids;
     const uint32_t rounds = by_number ? ov_tuned.patch_rounds : ov_tuned.part_mends;
     uint32_t n = 0, idle = 0;
-    bool changed = true;
+    bool changed = true; /* by the last round */
     choose_all(j);
     OV_TRY(survey(context, j));
     for (; n < rounds && j->total->spots > 0; ++n) {
         if (n == 0 || is_better(j, &best)) {
             OV_TRY(keep(context, j, &best));
             idle = 0;
-        } else if (by_number) {
+        } else if (by_number && changed) {
             OV_TRY(go_back(context, j, &best, true));
             OV_TRY(keep(context, j, &best));
-        } else if (++idle == ov_tuned.part_mends_idle) {
+        } else if (!by_number && ++idle == ov_tuned.part_mends_idle) {
             break;
         }
         OV_TRY(mend(context, j, n, result, &changed));
         if (!changed && !by_number) /* it would not the next time either */
             break;
     }
-    if (n > 0 && !is_better(j, &best)) {
+    const bool at_best = !changed && idle == 0; /* it is there as it was kept */
+    if (n > 0 && !at_best && !is_better(j, &best)) {
         const double deviation = best.deviation;
         OV_TRY(go_back(context, j, &best, !by_number));
         j->total->deviation = deviation;
